@@ -1,0 +1,23 @@
+//! Enclosures for bees between two curved walls, the ideal foam in the same gap, and the comb read from photographs.
+//!
+//! Three jobs share one geometry. [`surface::Gap`] is the gap between two walls of a level set; the enclosure prints it and
+//! the foam fills it. [`tessellation::CellPattern`] is a page of cells and who touches whom; the foam makes one, a photograph
+//! of comb gives one, and the two are compared without knowing where they came from.
+//!
+//! Rooms, each with a page of its own; imports point downward only:
+//!
+//! | room | job |
+//! |---|---|
+//! | [`units`], [`index`] | lengths with their unit; indices that know what they index |
+//! | [`surface`] | level sets, curvature, nearest points, the gap |
+//! | [`mesh`] | triangle meshes, marching cubes, checks, measures, file formats |
+//! | [`tessellation`] | who touches whom, sides, defects, distributions |
+//! | [`enclosure`] | from a recipe to printable, inspected parts |
+//! | [`report`] | tables, figures, files |
+//!
+//! The library prints nothing. The program `combwright` is built with the feature `cli`.
+
+pub mod index;
+pub mod surface;
+pub mod tessellation;
+pub mod units;

@@ -1,0 +1,144 @@
+//! Projection onto a level set, and the nearest point of it.
+
+use super::LevelSet;
+use glam::{DVec2, DVec3};
+
+/// A point could not be brought onto a level set.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("no point of {surface} at level {level} was found from {point} (the level does not exist there, or the point lies on the surface's skeleton)")]
+pub struct NoFoot {
+    /// The level set's name.
+    pub surface: &'static str,
+    /// The level asked for.
+    pub level: f64,
+    /// Where the search began.
+    pub point: DVec3,
+}
+
+/// Steps before a search is given up: Newton steps settle in under ten from any sensible start.
+const STEP_LIMIT: usize = 60;
+
+/// Halvings of a step before it is given up: 2⁻³⁰ of a step no longer moves a point.
+const HALVING_LIMIT: usize = 30;
+
+/// Newton steps along the gradient, halved where they do not reduce `|Φ - level|`.
+pub(super) fn project<S: LevelSet + ?Sized>(surface: &S, p: DVec3, level: f64) -> Result<DVec3, NoFoot> {
+    let failed = || NoFoot { surface: surface.name(), level, point: p };
+    let mut q = p;
+    let mut residual = surface.value(q) - level;
+    for _ in 0..STEP_LIMIT {
+        let gradient = surface.gradient(q);
+        let slope2 = gradient.length_squared();
+        // A step below the rounding of the coordinates cannot improve the point.
+        let floor = 4.0 * f64::EPSILON * (q.abs().max_element() + f64::MIN_POSITIVE) * slope2.sqrt();
+        if residual.abs() <= floor {
+            return Ok(q);
+        }
+        if slope2 <= 0.0 || !slope2.is_finite() {
+            return Err(failed());
+        }
+        let full = -residual / slope2 * gradient;
+        match halved_until(|factor| {
+            let candidate = q + factor * full;
+            let value = surface.value(candidate) - level;
+            (value.abs() < residual.abs()).then_some((candidate, value))
+        }) {
+            Some((candidate, value)) => (q, residual) = (candidate, value),
+            // No step reduces the residual any more: it is rounding, or the search is stuck.
+            None if residual.abs() <= 1e3 * floor => return Ok(q),
+            None => return Err(failed()),
+        }
+    }
+    Err(failed())
+}
+
+/// Riemannian Newton steps on `½|q - p|²` over the level set, each followed by [`project`] as the retraction; a gradient
+/// step where the reduced Hessian is not positive.
+pub(super) fn nearest_from<S: LevelSet + ?Sized>(
+    surface: &S,
+    p: DVec3,
+    level: f64,
+    start: DVec3,
+) -> Result<DVec3, NoFoot> {
+    let mut q = surface.project(start, level)?;
+    let mut distance2 = q.distance_squared(p);
+    for _ in 0..STEP_LIMIT {
+        let step = tangent_newton_step(surface, p, q);
+        // The distance changes by the square of the step: below this the foot cannot be told better.
+        let scale = distance2.sqrt().max(p.abs().max_element());
+        if step.length() <= 4.0 * f64::EPSILON * scale {
+            return Ok(q);
+        }
+        match halved_until(|factor| {
+            let candidate = surface.project(q + factor * step, level).ok()?;
+            let d2 = candidate.distance_squared(p);
+            (d2 < distance2).then_some((candidate, d2))
+        }) {
+            Some((candidate, d2)) => (q, distance2) = (candidate, d2),
+            None if step.length() <= 1e-7 * scale => {
+                // The distance is flat to rounding; one full step still improves the foot.
+                return Ok(surface.project(q + step, level).unwrap_or(q));
+            }
+            None => return Err(NoFoot { surface: surface.name(), level, point: p }),
+        }
+    }
+    Err(NoFoot { surface: surface.name(), level, point: p })
+}
+
+/// The step in the tangent plane at `q` towards the foot of `p`.
+fn tangent_newton_step<S: LevelSet + ?Sized>(surface: &S, p: DVec3, q: DVec3) -> DVec3 {
+    let gradient = surface.gradient(q);
+    let slope = gradient.length();
+    let normal = gradient / slope;
+    let (u, v) = normal.any_orthonormal_pair();
+    let residual = DVec2::new((p - q).dot(u), (p - q).dot(v));
+    // The Hessian of ½|q - p|² on the surface: identity plus height times the shape operator.
+    let height = (p - q).dot(normal) / slope;
+    let hessian = surface.hessian(q);
+    let (hu, hv) = (hessian * u, hessian * v);
+    let (a, b, c) = (1.0 + height * hu.dot(u), height * hu.dot(v), 1.0 + height * hv.dot(v));
+    let determinant = a * c - b * b;
+    let step = if a > 0.0 && determinant > 1e-9 * (a + c) * (a + c) {
+        DVec2::new(c * residual.x - b * residual.y, a * residual.y - b * residual.x) / determinant
+    } else {
+        residual
+    };
+    step.x * u + step.y * v
+}
+
+/// The crossing of `surface = level` between two points on opposite sides, by the Illinois form of the regula falsi.
+pub(super) fn crossing<S: LevelSet + ?Sized>(surface: &S, a: DVec3, b: DVec3, level: f64) -> DVec3 {
+    let value = |t: f64| surface.value(a.lerp(b, t)) - level;
+    let (mut low, mut high) = (0.0, 1.0);
+    let (mut at_low, mut at_high) = (value(low), value(high));
+    let mut last_side = 0;
+    for _ in 0..STEP_LIMIT {
+        let t = (low * at_high - high * at_low) / (at_high - at_low);
+        let here = value(t);
+        if here.abs() < 1e-14 || high - low < 1e-15 {
+            return a.lerp(b, t);
+        }
+        if (here < 0.0) == (at_low < 0.0) {
+            (low, at_low) = (t, here);
+            at_high *= if last_side == -1 { 0.5 } else { 1.0 };
+            last_side = -1;
+        } else {
+            (high, at_high) = (t, here);
+            at_low *= if last_side == 1 { 0.5 } else { 1.0 };
+            last_side = 1;
+        }
+    }
+    a.lerp(b, 0.5 * (low + high))
+}
+
+/// Tries factors 1, ½, ¼ … until `attempt` succeeds.
+fn halved_until<T>(attempt: impl Fn(f64) -> Option<T>) -> Option<T> {
+    let mut factor = 1.0;
+    for _ in 0..HALVING_LIMIT {
+        if let Some(found) = attempt(factor) {
+            return Some(found);
+        }
+        factor *= 0.5;
+    }
+    None
+}

@@ -1,0 +1,79 @@
+//! The nodal Schwarz P-surface.
+
+use super::{GridSampler, LevelSet, Period, nearest, rows::Separable};
+use glam::{DMat3, DVec3};
+use std::f64::consts::TAU;
+
+/// `Φ = cos(2πx/L) + cos(2πy/L) + cos(2πz/L)`, the nodal approximation of Schwarz's primitive surface with period `L`.
+///
+/// Close to a minimal surface, but not one: on `Φ = 0` the mean curvature reaches 1.28/L. `Φ` is largest, 3, at the lattice
+/// points, so the normal points towards them. Planes `x = 0` and `x = L/2` (and so for y, z) are mirrors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SchwarzP {
+    /// The period `L`.
+    pub period: f64,
+}
+
+impl LevelSet for SchwarzP {
+    fn name(&self) -> &'static str {
+        "schwarz-p"
+    }
+
+    fn value(&self, p: DVec3) -> f64 {
+        let k = TAU / self.period;
+        (k * p.x).cos() + (k * p.y).cos() + (k * p.z).cos()
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        let k = TAU / self.period;
+        -k * DVec3::new((k * p.x).sin(), (k * p.y).sin(), (k * p.z).sin())
+    }
+
+    fn hessian(&self, p: DVec3) -> DMat3 {
+        let k = TAU / self.period;
+        DMat3::from_diagonal(-k * k * DVec3::new((k * p.x).cos(), (k * p.y).cos(), (k * p.z).cos()))
+    }
+
+    fn period(&self) -> Period {
+        Period::cubic(self.period)
+    }
+
+    fn domain(&self) -> (DVec3, DVec3) {
+        (DVec3::ZERO, DVec3::splat(self.period))
+    }
+
+    fn level_limits(&self) -> (f64, f64) {
+        (-1.0, 1.0)
+    }
+
+    fn euler_characteristic(&self) -> i32 {
+        -4
+    }
+
+    fn sampler<'a>(&'a self, axes: [&'a [f64]; 3]) -> Box<dyn GridSampler + 'a> {
+        let k = TAU / self.period;
+        Box::new(Separable { tables: axes.map(|axis| axis.iter().map(|x| (k * x).cos()).collect()) })
+    }
+
+    /// Along an axis the crossing is an arc cosine; other segments are searched.
+    fn crossing(&self, a: DVec3, b: DVec3, level: f64) -> DVec3 {
+        let along = (b - a).abs();
+        let axis = (0..3).find(|&axis| along[axis] >= along.element_sum());
+        let analytic = axis.and_then(|axis| {
+            let k = TAU / self.period;
+            let others: f64 = (0..3).filter(|&other| other != axis).map(|other| (k * a[other]).cos()).sum();
+            let angle = (level - others).clamp(-1.0, 1.0).acos() / k;
+            let (low, high) = (a[axis].min(b[axis]), a[axis].max(b[axis]));
+            // The roots are ±angle up to whole periods; take the one between the ends.
+            [angle, -angle].into_iter().find_map(|root| {
+                let x = root + self.period * ((0.5 * (low + high) - root) / self.period).round();
+                (low <= x && x <= high).then(|| {
+                    let mut p = a;
+                    p[axis] = x;
+                    p
+                })
+            })
+        });
+        analytic.unwrap_or_else(|| nearest::crossing(self, a, b, level))
+    }
+}
