@@ -21,9 +21,27 @@ const STEP_LIMIT: usize = 60;
 /// Halvings of a step before it is given up: 2⁻³⁰ of a step no longer moves a point.
 const HALVING_LIMIT: usize = 30;
 
+/// Stiffness of the distance below which a direction counts as flat: its Newton step would leave the neighbourhood.
+const LEAST_STIFFNESS: f64 = 1e-3;
+
+/// A push off a saddle, as a part of the distance: large enough to leave it in a few steps.
+const SADDLE_PUSH: f64 = 0.02;
+
+/// A creeping step at a focal point that is accepted, as a part of the distance: the distance is then good to 1e-4 of it
+/// at worst.
+const FOCAL_STEP: f64 = 1e-2;
+
+/// The longest step of a projection, as a part of the domain's least extent: half a chamber.
+const LONGEST_STEP: f64 = 0.125;
+
+/// How far aside a search starts anew where the gradient vanishes, as a part of the domain: within the chamber still.
+const OFF_CENTRE: f64 = 0.05;
+
 /// Newton steps along the gradient, halved where they do not reduce `|Φ - level|`.
 pub(super) fn project<S: LevelSet + ?Sized>(surface: &S, p: DVec3, level: f64) -> Result<DVec3, NoFoot> {
     let failed = || NoFoot { surface: surface.name(), level, point: p };
+    let (low, high) = surface.domain();
+    let longest = LONGEST_STEP * (high - low).min_element();
     let mut q = p;
     let mut residual = surface.value(q) - level;
     for _ in 0..STEP_LIMIT {
@@ -37,7 +55,8 @@ pub(super) fn project<S: LevelSet + ?Sized>(surface: &S, p: DVec3, level: f64) -
         if slope2 <= 0.0 || !slope2.is_finite() {
             return Err(failed());
         }
-        let full = -residual / slope2 * gradient;
+        // Where the gradient nearly vanishes the full step would leave the neighbourhood.
+        let full = (-residual / slope2 * gradient).clamp_length_max(longest);
         match halved_until(|factor| {
             let candidate = q + factor * full;
             let value = surface.value(candidate) - level;
@@ -60,14 +79,25 @@ pub(super) fn nearest_from<S: LevelSet + ?Sized>(
     level: f64,
     start: DVec3,
 ) -> Result<DVec3, NoFoot> {
-    let mut q = surface.project(start, level)?;
+    // Where the gradient vanishes, as in the middle of a chamber or on the axis of a neck, no direction leads to the
+    // surface; places a little off do.
+    let (low, high) = surface.domain();
+    let aside = OFF_CENTRE * (high - low).min_element();
+    let others = DVec3::AXES.into_iter().flat_map(|axis| [start + aside * axis, start - aside * axis]);
+    std::iter::once(start)
+        .chain(others)
+        .find_map(|place| descend(surface, p, level, surface.project(place, level).ok()?))
+        .ok_or(NoFoot { surface: surface.name(), level, point: p })
+}
+
+/// The descent from a point `q` of the level set to the foot of `p`; `None` if it does not settle.
+fn descend<S: LevelSet + ?Sized>(surface: &S, p: DVec3, level: f64, mut q: DVec3) -> Option<DVec3> {
     let mut distance2 = q.distance_squared(p);
     for _ in 0..STEP_LIMIT {
         let step = tangent_newton_step(surface, p, q);
-        // The distance changes by the square of the step: below this the foot cannot be told better.
-        let scale = distance2.sqrt().max(p.abs().max_element());
+        let scale = distance2.sqrt().max(p.abs().max_element()).max(q.abs().max_element());
         if step.length() <= 4.0 * f64::EPSILON * scale {
-            return Ok(q);
+            return Some(q);
         }
         match halved_until(|factor| {
             let candidate = surface.project(q + factor * step, level).ok()?;
@@ -75,17 +105,19 @@ pub(super) fn nearest_from<S: LevelSet + ?Sized>(
             (d2 < distance2).then_some((candidate, d2))
         }) {
             Some((candidate, d2)) => (q, distance2) = (candidate, d2),
-            None if step.length() <= 1e-7 * scale => {
-                // The distance is flat to rounding; one full step still improves the foot.
-                return Ok(surface.project(q + step, level).unwrap_or(q));
+            // The distance is flat to rounding; one full step still improves the foot.
+            None if step.length() <= 1e-6 * scale => {
+                return Some(surface.project(q + step, level).unwrap_or(q));
             }
-            None => return Err(NoFoot { surface: surface.name(), level, point: p }),
+            None => break,
         }
     }
-    Err(NoFoot { surface: surface.name(), level, point: p })
+    // At a focal point the distance is flat to fourth order and the steps only creep; the distance itself is good by then.
+    (tangent_newton_step(surface, p, q).length() <= FOCAL_STEP * distance2.sqrt()).then_some(q)
 }
 
-/// The step in the tangent plane at `q` towards the foot of `p`.
+/// The step in the tangent plane at `q` towards the foot of `p`: Newton's, with the absolute values of the reduced Hessian's
+/// eigenvalues, and a push down the other side where `q` is a saddle of the distance.
 fn tangent_newton_step<S: LevelSet + ?Sized>(surface: &S, p: DVec3, q: DVec3) -> DVec3 {
     let gradient = surface.gradient(q);
     let slope = gradient.length();
@@ -97,12 +129,15 @@ fn tangent_newton_step<S: LevelSet + ?Sized>(surface: &S, p: DVec3, q: DVec3) ->
     let hessian = surface.hessian(q);
     let (hu, hv) = (hessian * u, hessian * v);
     let (a, b, c) = (1.0 + height * hu.dot(u), height * hu.dot(v), 1.0 + height * hv.dot(v));
-    let determinant = a * c - b * b;
-    let step = if a > 0.0 && determinant > 1e-9 * (a + c) * (a + c) {
-        DVec2::new(c * residual.x - b * residual.y, a * residual.y - b * residual.x) / determinant
-    } else {
-        residual
-    };
+    let half_trace = 0.5 * (a + c);
+    let spread = (0.25 * (a - c) * (a - c) + b * b).sqrt();
+    let low_axis = DVec2::from_angle(0.5 * (-2.0 * b).atan2(c - a));
+    let (low, high) = (half_trace - spread, half_trace + spread);
+    let along = |axis: DVec2, value: f64| residual.dot(axis) / value.abs().max(LEAST_STIFFNESS) * axis;
+    let mut step = along(low_axis, low) + along(low_axis.perp(), high);
+    if low < -LEAST_STIFFNESS && step.length() <= SADDLE_PUSH * (p - q).length() {
+        step += SADDLE_PUSH * (p - q).length() * low_axis;
+    }
     step.x * u + step.y * v
 }
 
