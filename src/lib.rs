@@ -10,14 +10,16 @@
 //! |---|---|
 //! | [`units`], [`index`] | lengths with their unit; indices that know what they index |
 //! | [`surface`] | level sets, curvature, nearest points, the gap |
-//! | [`mesh`] | triangle meshes, marching cubes, checks, measures, file formats |
 //! | [`tessellation`] | who touches whom, sides, defects, distributions |
-//! | [`enclosure`] | from a recipe to printable, inspected parts |
 //! | [`report`] | tables, figures, files |
 //!
 //! The library prints nothing. The program `combwright` is built with the feature `cli`.
 
 pub mod index;
+pub mod report;
 pub mod surface;
 pub mod tessellation;
 pub mod units;
+
+#[cfg(feature = "cli")]
+pub mod cli;

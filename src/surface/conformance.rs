@@ -50,7 +50,10 @@ fn gradients_and_hessians_agree_with_differences() {
                 *hessian.col_mut(axis) = (surface.gradient(p + d) - surface.gradient(p - d)) / (2.0 * step);
             }
             assert!((gradient - jet.gradient).length() < 1e-6 * (1.0 + gradient.length()), "{surface:?} {p}");
-            assert!(hessian.abs_diff_eq(jet.hessian, 1e-5 * (1.0 + hessian.x_axis.length())), "{surface:?} {p}");
+            assert!(
+                hessian.abs_diff_eq(jet.hessian, 1e-5 * (1.0 + hessian.x_axis.length())),
+                "{surface:?} {p}"
+            );
             assert!(jet.hessian.abs_diff_eq(jet.hessian.transpose(), 1e-9), "{surface:?} {p}");
             let single = (surface.value(p), surface.gradient(p), surface.hessian(p));
             assert!((jet.value - single.0).abs() < 1e-14, "{surface:?} {p}");

@@ -176,8 +176,11 @@ impl Gap {
         if width / 2.0 + margin >= reach {
             return Err(GapError::Folds { surface: surface.name(), width, margin, reach });
         }
-        let field: Arc<dyn LevelSet> =
-            if surface.is_distance() { surface.clone() } else { Arc::new(SignedDistance::new(surface.clone())) };
+        let field: Arc<dyn LevelSet> = if surface.is_distance() {
+            surface.clone()
+        } else {
+            Arc::new(SignedDistance::new(surface.clone()))
+        };
         let walls = [-0.5 * width, 0.5 * width].map(|level| Wall { field: field.clone(), level });
         Ok(Self { middle: surface, walls, kind: GapKind::Parallel })
     }
@@ -325,9 +328,12 @@ mod tests {
     fn level_set_gaps_are_those_of_the_reference() -> Result<(), GapError> {
         // The least gap is across the flat points, along a diagonal, and exact. Mean and max are reference figures of sampled
         // distances; theirs and these sums are good to 2e-3 of the gap.
-        for (delta, mean, max) in
-            [(0.05, 0.01213, 0.01592), (0.2, 0.04855, 0.06409), (0.5, 0.12136, 0.16523), (0.9, 0.21577, 0.29122)]
-        {
+        for (delta, mean, max) in [
+            (0.05, 0.01213, 0.01592),
+            (0.2, 0.04855, 0.06409),
+            (0.5, 0.12136, 0.16523),
+            (0.9, 0.21577, 0.29122),
+        ] {
             let range = Gap::level_set(schwarz_p(), LevelOffset(delta))?.range();
             let min = 3.0_f64.sqrt() * (delta / 3.0_f64).asin() / std::f64::consts::PI;
             assert!((range.min - min).abs() < 1e-9, "δ = {delta}: {} is not {min}", range.min);
@@ -351,7 +357,8 @@ mod tests {
 
     #[test]
     fn a_gap_that_no_level_reaches_is_refused_with_the_largest() {
-        let Err(GapError::Unreachable { largest, .. }) = Gap::with_named(schwarz_p(), NamedGap::Min, 0.25) else {
+        let Err(GapError::Unreachable { largest, .. }) = Gap::with_named(schwarz_p(), NamedGap::Min, 0.25)
+        else {
             panic!("accepted");
         };
         assert!((0.18..0.20).contains(&largest), "{largest}");
@@ -362,7 +369,8 @@ mod tests {
         let reach = 1.0 / std::f64::consts::TAU;
         let gap = Gap::parallel(schwarz_p(), 2.0 * (reach - 0.0101), 0.01)?;
         assert!((gap.figure(NamedGap::Max) - gap.figure(NamedGap::Min)).abs() < 1e-15);
-        let Err(GapError::Folds { reach: found, .. }) = Gap::parallel(schwarz_p(), 2.0 * (reach - 0.0099), 0.01)
+        let Err(GapError::Folds { reach: found, .. }) =
+            Gap::parallel(schwarz_p(), 2.0 * (reach - 0.0099), 0.01)
         else {
             panic!("accepted");
         };

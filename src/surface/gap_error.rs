@@ -28,7 +28,9 @@ pub enum GapError {
         high: f64,
     },
     /// The lower wall is not below the upper one.
-    #[error("the lower wall is at level {lower} and the upper one at {upper}; the lower must be below the upper")]
+    #[error(
+        "the lower wall is at level {lower} and the upper one at {upper}; the lower must be below the upper"
+    )]
     Order {
         /// The level of the lower wall.
         lower: f64,

@@ -37,8 +37,7 @@ impl LevelSet for Gyroid {
 
     fn hessian(&self, p: DVec3) -> DMat3 {
         let (s, c, k) = self.waves(p);
-        let (xx, yy, zz) =
-            (s[0] * c[1] + s[2] * c[0], s[1] * c[2] + s[0] * c[1], s[2] * c[0] + s[1] * c[2]);
+        let (xx, yy, zz) = (s[0] * c[1] + s[2] * c[0], s[1] * c[2] + s[0] * c[1], s[2] * c[0] + s[1] * c[2]);
         let (xy, yz, zx) = (c[0] * s[1], c[1] * s[2], c[2] * s[0]);
         -k * k * DMat3::from_cols(DVec3::new(xx, xy, zx), DVec3::new(xy, yy, yz), DVec3::new(zx, yz, zz))
     }

@@ -5,7 +5,9 @@ use glam::{DVec2, DVec3};
 
 /// A point could not be brought onto a level set.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("no point of {surface} at level {level} was found from {point} (the level does not exist there, or the point lies on the surface's skeleton)")]
+#[error(
+    "no point of {surface} at level {level} was found from {point} (the level does not exist there, or the point lies on the surface's skeleton)"
+)]
 pub struct NoFoot {
     /// The level set's name.
     pub surface: &'static str,

@@ -45,8 +45,7 @@ impl SignedDistance {
         let (hu, hv) = (hessian * u / slope, hessian * v / slope);
         let shape = DMat2::from_cols(DVec2::new(hu.dot(u), hu.dot(v)), DVec2::new(hv.dot(u), hv.dot(v)));
         let moved = shape * (DMat2::IDENTITY + d * shape).inverse();
-        let (cu, cv) =
-            (moved.x_axis.x * u + moved.x_axis.y * v, moved.y_axis.x * u + moved.y_axis.y * v);
+        let (cu, cv) = (moved.x_axis.x * u + moved.x_axis.y * v, moved.y_axis.x * u + moved.y_axis.y * v);
         DMat3::from_cols(u.x * cu + v.x * cv, u.y * cu + v.y * cv, u.z * cu + v.z * cv)
     }
 }

@@ -11,4 +11,6 @@
 
 mod pattern;
 
-pub use pattern::{Cell, CellId, CellPattern, CellStatus, CellWall, PATTERN_SCHEMA, PatternDefect, Surroundings};
+pub use pattern::{
+    Cell, CellId, CellPattern, CellStatus, CellWall, PATTERN_SCHEMA, PatternDefect, Surroundings,
+};

@@ -117,7 +117,9 @@ pub enum PatternDefect {
         cells: usize,
     },
     /// A wall that is not seen from the other side.
-    #[error("cell {cell:?} touches {neighbour:?} across {times} walls, but {neighbour:?} touches it across {back}")]
+    #[error(
+        "cell {cell:?} touches {neighbour:?} across {times} walls, but {neighbour:?} touches it across {back}"
+    )]
     OneSided {
         /// The cell.
         cell: CellId,
@@ -268,7 +270,11 @@ mod tests {
                 gauss_curvature: None,
                 walls: ring(centre)
                     .into_iter()
-                    .map(|i| CellWall { neighbour: Some(CellId::from_index(i)), shift: IVec3::ZERO, length: 1.0 })
+                    .map(|i| CellWall {
+                        neighbour: Some(CellId::from_index(i)),
+                        shift: IVec3::ZERO,
+                        length: 1.0,
+                    })
                     .collect(),
             })
             .collect()
@@ -301,7 +307,9 @@ mod tests {
 
     #[test]
     fn json_and_back_is_the_identity() -> Result<(), Box<dyn std::error::Error>> {
-        let Ok(pattern) = CellPattern::new("px", Surroundings::Open, dodecahedron()) else { panic!("refused") };
+        let Ok(pattern) = CellPattern::new("px", Surroundings::Open, dodecahedron()) else {
+            panic!("refused")
+        };
         let text = serde_json::to_string(&pattern)?;
         let back: CellPattern = serde_json::from_str(&text)?;
         assert_eq!(pattern, back);

@@ -1,0 +1,49 @@
+//! The command line: the only room that prints.
+//!
+//! **Enters** what was typed. **Leaves** settings for the library, results on stdout or in files, messages on stderr, and
+//! an exit code: 0, 1 for a failure, 2 for a user's mistake.
+//!
+//! | command | file |
+//! |---|---|
+//! | how a command ends, progress on a terminal | `outcome.rs`, `progress.rs` |
+//! | shell completions, manual page | `manual.rs` |
+
+// Printing is this room's job.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "the only room that prints")]
+
+mod manual;
+mod outcome;
+mod progress;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use std::process::ExitCode;
+
+pub use outcome::CliError;
+
+/// Enclosures for bees between two curved walls, the ideal foam in the same gap, and the comb read from photographs.
+#[derive(Debug, Parser)]
+#[command(name = "combwright", version, max_term_width = 100, arg_required_else_help = true)]
+#[command(after_help = "Each command has a page of its own: combwright COMMAND --help")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Print a completion script for a shell to stdout
+    Completions(manual::CompletionArguments),
+    /// Print the manual page (roff) to stdout
+    Man,
+}
+
+/// Runs the program with the arguments of the process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let ended = match arguments.command {
+        Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
+        Command::Man => manual::page(Arguments::command()),
+    };
+    outcome::exit_code(ended)
+}

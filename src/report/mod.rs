@@ -1,0 +1,16 @@
+//! Results as files that people read.
+//!
+//! **Enters** finished results of the other rooms. **Leaves** files: tables, figures as SVG and PNG, shaded pictures.
+//!
+//! | step | file |
+//! |---|---|
+//! | an output folder that appears whole or not at all | `folder.rs` |
+//! | a figure in SVG, and the same rasterised | `figure.rs` |
+//! | shaded triangles in a picture | `render.rs` |
+//! | colours that colour-blind readers tell apart | `palette.rs` |
+//! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs` |
+
+pub mod figure;
+pub mod folder;
+pub mod palette;
+pub mod render;
