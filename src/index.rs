@@ -90,6 +90,11 @@ impl<I: Id, T> IndexVec<I, T> {
         id
     }
 
+    /// Adds all items of another vector behind those of this one.
+    pub fn extend(&mut self, other: Self) {
+        self.items.extend(other.items);
+    }
+
     /// The number of items.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -16,6 +16,7 @@
 //! The library prints nothing. The program `combwright` is built with the feature `cli`.
 
 pub mod index;
+pub mod mesh;
 pub mod report;
 pub mod surface;
 pub mod tessellation;

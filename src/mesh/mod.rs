@@ -1,0 +1,28 @@
+//! Triangle meshes.
+//!
+//! **Enters** a level set and a grid, or outlines of a plate. **Leaves** meshes that are proved to bound solids, measured
+//! and written.
+//!
+//! | step | file |
+//! |---|---|
+//! | mesh, closed mesh | `tri_mesh.rs` |
+//! | what keeps a mesh from being closed | `check.rs` |
+//! | the 256 cases of a cube, derived | `cube_cases.rs` |
+//! | marching cubes over one level | `march.rs` |
+//! | the solid between two copies of an open sheet | `sheet.rs` |
+//! | volume, area, Euler number, pieces, overhang | `measure.rs` |
+//!
+//! Not promised: that a closed mesh does not intersect itself; [`self_intersections`] tells.
+
+mod check;
+mod cube_cases;
+mod march;
+pub mod measure;
+mod sheet;
+mod tri_mesh;
+
+pub use check::MeshDefect;
+pub use march::{Grid, march};
+pub use measure::euler_number;
+pub use sheet::{Legs, Sheet};
+pub use tri_mesh::{ClosedMesh, MeshDefects, TriMesh, VertexId};
