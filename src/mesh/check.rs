@@ -216,7 +216,8 @@ mod tests {
     /// A tetrahedron with its corner at `at`.
     fn tetrahedron(at: DVec3) -> TriMesh {
         let positions = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|p| p + at).to_vec().into();
-        let triangles = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(|t| t.map(VertexId::from_index)).to_vec();
+        let triangles =
+            [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(|t| t.map(VertexId::from_index)).to_vec();
         TriMesh { positions, triangles }
     }
 
@@ -234,10 +235,18 @@ mod tests {
         assert_eq!(defects(&open).len(), 3, "{:?}", defects(&open));
         let mut turned = tetrahedron(DVec3::ZERO);
         turned.triangles[0].swap(0, 1);
-        assert!(defects(&turned).iter().all(|d| matches!(d, MeshDefect::BadEdge(_, _, 2, 0) | MeshDefect::BadEdge(_, _, 0, 2))));
+        assert!(
+            defects(&turned)
+                .iter()
+                .all(|d| matches!(d, MeshDefect::BadEdge(_, _, 2, 0) | MeshDefect::BadEdge(_, _, 0, 2)))
+        );
         let mut doubled = tetrahedron(DVec3::ZERO);
         doubled.triangles.push(doubled.triangles[0]);
-        assert!(defects(&doubled).contains(&MeshDefect::BadEdge(v(0), v(2), 2, 1)), "{:?}", defects(&doubled));
+        assert!(
+            defects(&doubled).contains(&MeshDefect::BadEdge(v(0), v(2), 2, 1)),
+            "{:?}",
+            defects(&doubled)
+        );
         let mut flat = tetrahedron(DVec3::ZERO);
         flat.positions[v(3)] = DVec3::new(0.5, 0.5, 0.0);
         assert_eq!(defects(&flat), [MeshDefect::Degenerate(2)]);

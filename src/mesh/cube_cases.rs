@@ -32,7 +32,11 @@ fn faces() -> [[u8; 4]; 6] {
         let (axis, far) = (face / 2, face % 2);
         let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
         let base = u8::from(far == 1) << axis;
-        if far == 1 { [base, base | u, base | u | v, base | v] } else { [base, base | v, base | u | v, base | u] }
+        if far == 1 {
+            [base, base | u, base | u | v, base | v]
+        } else {
+            [base, base | v, base | u | v, base | u]
+        }
     })
 }
 
@@ -176,9 +180,9 @@ mod tests {
                     })
                     .collect();
                 for right in 0..256_usize {
-                    let agree = (0..8).filter(|c| c >> axis & 1 == 0).all(|c| {
-                        (right >> c & 1) == (left >> (c | 1 << axis) & 1)
-                    });
+                    let agree = (0..8)
+                        .filter(|c| c >> axis & 1 == 0)
+                        .all(|c| (right >> c & 1) == (left >> (c | 1 << axis) & 1));
                     if agree {
                         assert_eq!(far, cut(&CUBE_CASES[right], &on_near), "axis {axis}: {left} | {right}");
                     }
@@ -193,11 +197,8 @@ mod tests {
             let case = &CUBE_CASES[1 << corner];
             assert_eq!(case.len(), 1);
             let [a, b, c] = case[0].map(middle);
-            let place = DVec3::new(
-                f64::from(corner & 1),
-                f64::from(corner >> 1 & 1),
-                f64::from(corner >> 2 & 1),
-            );
+            let place =
+                DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2 & 1));
             assert!((b - a).cross(c - a).dot(place - a) > 0.0, "corner {corner}");
         }
     }

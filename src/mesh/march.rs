@@ -96,7 +96,13 @@ pub fn march(surface: &dyn LevelSet, level: f64, grid: &Grid) -> Result<TriMesh,
     assert!(grid.cells.iter().all(|&n| n > 0), "a grid has cells along each axis");
     let axes = grid.axes();
     let sampler = surface.sampler(axes.each_ref().map(Vec::as_slice));
-    let field = Field { surface, level, axes: &axes, sampler: sampler.as_ref(), near: near_value(surface, level, grid) };
+    let field = Field {
+        surface,
+        level,
+        axes: &axes,
+        sampler: sampler.as_ref(),
+        near: near_value(surface, level, grid),
+    };
     let layers = grid.cells[2];
     let slabs: Vec<Slab> = (0..layers.div_ceil(SLAB_LAYERS))
         .into_par_iter()
@@ -181,7 +187,14 @@ struct Plane {
 impl Plane {
     fn empty([nx, ny]: [usize; 2]) -> Self {
         let numbers = || vec![NONE; nx * ny];
-        Self { k: 0, above: vec![0; nx * ny], x_ids: numbers(), y_ids: numbers(), node_ids: numbers(), joined: vec![] }
+        Self {
+            k: 0,
+            above: vec![0; nx * ny],
+            x_ids: numbers(),
+            y_ids: numbers(),
+            node_ids: numbers(),
+            joined: vec![],
+        }
     }
 
     fn sample(&mut self, field: &Field<'_>, k: usize) {
@@ -297,8 +310,12 @@ impl Slab {
                     |i| crossed.push(i),
                 );
                 for &i in &crossed {
-                    plane.y_ids[j * nx + i] =
-                        self.vertex_in_plane(field, plane, [[i, j, k], [i, j + 1, k]], Key::YEdge(j * nx + i))?;
+                    plane.y_ids[j * nx + i] = self.vertex_in_plane(
+                        field,
+                        plane,
+                        [[i, j, k], [i, j + 1, k]],
+                        Key::YEdge(j * nx + i),
+                    )?;
                 }
             }
         }
@@ -352,14 +369,20 @@ impl Slab {
         let mut columns = vec![0_u8; nx];
         for j in 0..ny - 1 {
             let (near, far) = (j * nx..(j + 1) * nx, (j + 1) * nx..(j + 2) * nx);
-            let rows = [&lower.above[near.clone()], &lower.above[far.clone()], &upper.above[near], &upper.above[far]];
+            let rows = [
+                &lower.above[near.clone()],
+                &lower.above[far.clone()],
+                &upper.above[near],
+                &upper.above[far],
+            ];
             for (i, column) in columns.iter_mut().enumerate() {
                 *column = rows[0][i] | rows[1][i] << 1 | rows[2][i] << 2 | rows[3][i] << 3;
             }
             each_mixed(&columns, |i| {
                 let case = SPREAD[usize::from(columns[i])] | SPREAD[usize::from(columns[i + 1])] << 1;
                 for triangle in &CUBE_CASES[usize::from(case)] {
-                    let corners = triangle.map(|edge| vertex_of_edge(edge, [i, j], nx, [lower, upper], z_ids));
+                    let corners =
+                        triangle.map(|edge| vertex_of_edge(edge, [i, j], nx, [lower, upper], z_ids));
                     let [a, b, c] = corners;
                     // Crossings joined at a node leave triangles with repeated corners.
                     if a != b && b != c && c != a {
@@ -473,7 +496,8 @@ mod tests {
     }
 
     #[test]
-    fn spheres_are_closed_and_approach_their_volume_from_below_by_the_square_of_the_spacing() -> Result<(), NoFoot> {
+    fn spheres_are_closed_and_approach_their_volume_from_below_by_the_square_of_the_spacing()
+    -> Result<(), NoFoot> {
         let sphere = Sphere { radius: 1.0 };
         let volume = |cells| -> Result<f64, NoFoot> {
             let mesh = march(&sphere, 0.0, &cube(-1.25, 1.25, cells))?;
@@ -532,7 +556,9 @@ mod tests {
     fn the_same_bytes_for_one_and_two_threads() {
         let grid = Grid { low: DVec3::ZERO, high: DVec3::new(1.0, 1.0, 0.5), cells: [64, 64, 40] };
         let meshes = [1, 2].map(|threads| {
-            let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else { panic!("no pool") };
+            let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else {
+                panic!("no pool")
+            };
             pool.install(|| march(&SchwarzP { period: 1.0 }, 0.2, &grid))
         });
         assert!(meshes[0].is_ok() && meshes[0] == meshes[1]);

@@ -10,18 +10,24 @@
 //! | the 256 cases of a cube, derived | `cube_cases.rs` |
 //! | marching cubes over one level | `march.rs` |
 //! | the solid between two copies of an open sheet | `sheet.rs` |
+//! | nearest points, overlapping pairs | `bvh.rs` |
+//! | where a mesh intersects itself | `intersect.rs` |
 //! | volume, area, Euler number, pieces, overhang | `measure.rs` |
 //!
 //! Not promised: that a closed mesh does not intersect itself; [`self_intersections`] tells.
 
+mod bvh;
 mod check;
 mod cube_cases;
+mod intersect;
 mod march;
 pub mod measure;
 mod sheet;
 mod tri_mesh;
 
+pub use bvh::{Bvh, Closest};
 pub use check::MeshDefect;
+pub use intersect::self_intersections;
 pub use march::{Grid, march};
 pub use measure::euler_number;
 pub use sheet::{Legs, Sheet};

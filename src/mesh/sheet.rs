@@ -85,7 +85,11 @@ impl Sheet {
             .filter(|(_, [a, b, c])| (*b - *a).cross(*c - *a) == DVec3::ZERO)
             .map(|(index, _)| MeshDefect::Degenerate(index))
             .collect();
-        if degenerate.is_empty() { Ok(ClosedMesh::by_construction(solid)) } else { Err(MeshDefects(degenerate)) }
+        if degenerate.is_empty() {
+            Ok(ClosedMesh::by_construction(solid))
+        } else {
+            Err(MeshDefects(degenerate))
+        }
     }
 }
 
