@@ -12,6 +12,7 @@
 //! | the solid between two copies of an open sheet | `sheet.rs` |
 //! | nearest points, overlapping pairs | `bvh.rs` |
 //! | where a mesh intersects itself | `intersect.rs` |
+//! | STL, 3MF, PLY, OBJ, GLB | `format/` |
 //! | volume, area, Euler number, pieces, overhang | `measure.rs` |
 //!
 //! Not promised: that a closed mesh does not intersect itself; [`self_intersections`] tells.
@@ -19,6 +20,7 @@
 mod bvh;
 mod check;
 mod cube_cases;
+mod format;
 mod intersect;
 mod march;
 pub mod measure;
@@ -27,6 +29,7 @@ mod tri_mesh;
 
 pub use bvh::{Bvh, Closest};
 pub use check::MeshDefect;
+pub use format::{Part, WriteError, write_3mf, write_glb, write_obj, write_ply, write_stl};
 pub use intersect::self_intersections;
 pub use march::{Grid, march};
 pub use measure::euler_number;
