@@ -142,11 +142,24 @@ fn rounded(mesh: &TriMesh, place: impl Fn(DVec3) -> DVec3 + Sync) -> Result<Vec<
 
 /// The first two vertices at one place.
 fn merged(places: &[[f32; 3]]) -> Option<[usize; 2]> {
+    // Equal places have equal keys, and few others do: only a repeated key is worth the sort of whole places.
+    let mut keys: Vec<u64> = places.par_iter().map(key).collect();
+    keys.par_sort_unstable();
+    if keys.par_windows(2).all(|pair| pair[0] != pair[1]) {
+        return None;
+    }
     let mut keyed: Vec<([u32; 3], u32)> =
         places.par_iter().enumerate().map(|(index, p)| (p.map(f32::to_bits), checked_u32(index))).collect();
     keyed.par_sort_unstable();
     let pairs = keyed.par_windows(2).filter(|pair| pair[0].0 == pair[1].0);
     pairs.map(|pair| [pair[0].1 as usize, pair[1].1 as usize]).min()
+}
+
+/// A number that tells places apart, up to chance: their bits, spread by odd multipliers.
+fn key(place: &[f32; 3]) -> u64 {
+    place.iter().fold(0_u64, |key, x| {
+        (key ^ u64::from(x.to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+    })
 }
 
 /// A place in single precision, without negative zeros: readers that join equal places tell the two zeros apart.
