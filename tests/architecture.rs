@@ -13,7 +13,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("surface", &["units"]),
     ("mesh", &["units", "index", "surface"]),
     ("tessellation", &["units", "index"]),
-    ("enclosure", &["units", "surface", "mesh"]),
+    ("enclosure", &["units", "index", "surface", "mesh"]),
     ("foam", &["units", "index", "surface", "tessellation"]),
     ("evolver", &["index", "surface", "foam"]),
     ("comb", &["units", "index", "tessellation"]),

@@ -5,12 +5,15 @@
 //!
 //! | command | file |
 //! |---|---|
-//! | how a command ends, progress on a terminal | `outcome.rs`, `progress.rs` |
+//! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
+//! | `enclosure` | `enclosure.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the only room that prints")]
 
+mod enclosure;
+mod interrupt;
 mod manual;
 mod outcome;
 mod progress;
@@ -31,6 +34,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Build an enclosure: two shells with a gap for bees, and a base, as parts that print
+    Enclosure(enclosure::EnclosureArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -42,6 +47,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let ended = match arguments.command {
+        Command::Enclosure(arguments) => enclosure::run(&arguments),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };

@@ -13,6 +13,8 @@
 //! | nearest points, overlapping pairs | `bvh.rs` |
 //! | where a mesh intersects itself | `intersect.rs` |
 //! | STL, 3MF, PLY, OBJ, GLB | `format/` |
+//! | a plate with pockets and holes | `plate.rs` |
+//! | the lines in which a plane cuts a mesh | `section.rs` |
 //! | volume, area, Euler number, pieces, overhang | `measure.rs` |
 //!
 //! Not promised: that a closed mesh does not intersect itself; [`self_intersections`] tells.
@@ -24,6 +26,8 @@ mod format;
 mod intersect;
 mod march;
 pub mod measure;
+pub mod plate;
+mod section;
 mod sheet;
 mod tri_mesh;
 
@@ -33,5 +37,6 @@ pub use format::{Part, WriteError, write_3mf, write_glb, write_obj, write_ply, w
 pub use intersect::self_intersections;
 pub use march::{Grid, march};
 pub use measure::euler_number;
+pub use section::{CutPlane, SectionLine, section};
 pub use sheet::{Legs, Sheet};
 pub use tri_mesh::{ClosedMesh, MeshDefects, TriMesh, VertexId};

@@ -121,6 +121,12 @@ impl OutputFolder {
         &self.target
     }
 
+    /// Where the files are until then.
+    #[must_use]
+    pub fn staging(&self) -> &Path {
+        self.staging.path()
+    }
+
     /// Moves all files into the folder; files of other names that it holds stay. Gives the paths.
     ///
     /// # Errors

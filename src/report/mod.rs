@@ -10,6 +10,8 @@
 //! | colours that colour-blind readers tell apart | `palette.rs` |
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs` |
 
+pub mod enclosure;
+pub mod enclosure_section;
 pub mod figure;
 pub mod folder;
 pub mod palette;

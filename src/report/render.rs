@@ -9,7 +9,7 @@ use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 
 /// Samples along each side of a pixel.
-const SAMPLES: u32 = 3;
+const SAMPLES: u32 = 2;
 
 /// From where a scene is seen: parallel projection.
 #[derive(Clone, Copy, Debug)]
@@ -193,7 +193,7 @@ impl Canvas {
                     }
                 }
             }
-            let count = 9.0;
+            let count = 4.0;
             *pixel = Rgb(sum.map(|total| (total / count).round().clamp(0.0, 255.0) as u8));
         }
         picture

@@ -24,7 +24,7 @@ fn all() -> Vec<Box<dyn LevelSet>> {
 /// Points near the surface, but not on it: samples moved along the normal by a small part of the reach.
 fn near(surface: &dyn LevelSet) -> Vec<DVec3> {
     let samples = SurfaceSamples::new(surface, 0.0, 5);
-    let reach = super::reach(surface).min(1.0);
+    let reach = super::reach(surface, 0.0).min(1.0);
     assert!(samples.points().len() > 10, "{surface:?} is met too rarely");
     let along = [-0.2, 0.1, 0.25, -0.05];
     samples
@@ -56,6 +56,11 @@ fn gradients_and_hessians_agree_with_differences() {
             );
             assert!(jet.hessian.abs_diff_eq(jet.hessian.transpose(), 1e-9), "{surface:?} {p}");
             let single = (surface.value(p), surface.gradient(p), surface.hessian(p));
+            let (value, gradient) = surface.value_and_gradient(p);
+            assert!(
+                (value - single.0).abs() < 1e-14 && (gradient - single.1).length() < 1e-12,
+                "{surface:?} {p}"
+            );
             assert!((jet.value - single.0).abs() < 1e-14, "{surface:?} {p}");
             assert!((jet.gradient - single.1).length() < 1e-12, "{surface:?} {p}");
             assert!(jet.hessian.abs_diff_eq(single.2, 1e-12), "{surface:?} {p}");
@@ -79,7 +84,7 @@ fn a_period_changes_nothing() {
 #[test]
 fn projections_and_feet_lie_on_the_surface() {
     for surface in all() {
-        let scale = super::reach(surface.as_ref()).min(1.0);
+        let scale = super::reach(surface.as_ref(), 0.0).min(1.0);
         for p in near(surface.as_ref()) {
             for level in [0.0, 0.1 * scale] {
                 let (Ok(projected), Ok(foot)) = (surface.project(p, level), surface.nearest(p, level)) else {

@@ -172,7 +172,7 @@ impl Gap {
         if !(margin >= 0.0 && margin.is_finite()) {
             return Err(GapError::NotPositive { what: "thickness behind the gap", value: margin });
         }
-        let reach = reach(surface.as_ref());
+        let reach = reach(surface.as_ref(), 0.0);
         if width / 2.0 + margin >= reach {
             return Err(GapError::Folds { surface: surface.name(), width, margin, reach });
         }

@@ -39,7 +39,7 @@ pub enum GapError {
     },
     /// No level offset gives the gap.
     #[error(
-        "no level-set walls of {surface} have a {named} gap of {width}: the largest is {largest}, where the walls change their topology"
+        "no level-set walls of {surface} have a {named} gap of {width:.6}: the largest is {largest:.6}, where the walls change their topology"
     )]
     Unreachable {
         /// The surface.
@@ -53,7 +53,7 @@ pub enum GapError {
     },
     /// The offset would fold.
     #[error(
-        "parallel walls of {surface} fold: half the gap ({half}) and what lies behind it ({margin}) reach {beyond}, but the least radius of curvature is {reach}; the largest parallel gap is {largest}",
+        "parallel walls of {surface} fold: half the gap ({half:.6}) and what lies behind it ({margin:.6}) reach {beyond:.6}, but the least radius of curvature of the middle surface is {reach:.6}; the largest parallel gap is {largest:.6}",
         half = width / 2.0,
         beyond = width / 2.0 + margin,
         largest = (2.0 * (reach - margin)).max(0.0)
@@ -68,4 +68,20 @@ pub enum GapError {
         /// The least radius of curvature of the middle surface.
         reach: f64,
     },
+}
+
+impl GapError {
+    /// The same error with its lengths multiplied by `factor`, for messages in another unit.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        match self {
+            Self::Unreachable { surface, named, width, largest } => {
+                Self::Unreachable { surface, named, width: width * factor, largest: largest * factor }
+            }
+            Self::Folds { surface, width, margin, reach } => {
+                Self::Folds { surface, width: width * factor, margin: margin * factor, reach: reach * factor }
+            }
+            other => other,
+        }
+    }
 }

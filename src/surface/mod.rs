@@ -82,6 +82,11 @@ pub trait LevelSet: fmt::Debug + Send + Sync {
     /// The matrix of second derivatives of `Φ` at `p`.
     fn hessian(&self, p: DVec3) -> DMat3;
 
+    /// `Φ` and `∇Φ` at once.
+    fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        (self.value(p), self.gradient(p))
+    }
+
     /// Value, gradient and Hessian at once; cheaper than one by one where they share a search.
     fn jet(&self, p: DVec3) -> Jet {
         Jet { value: self.value(p), gradient: self.gradient(p), hessian: self.hessian(p) }

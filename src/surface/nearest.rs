@@ -45,9 +45,9 @@ pub(super) fn project<S: LevelSet + ?Sized>(surface: &S, p: DVec3, level: f64) -
     let (low, high) = surface.domain();
     let longest = LONGEST_STEP * (high - low).min_element();
     let mut q = p;
-    let mut residual = surface.value(q) - level;
+    let (value, mut gradient) = surface.value_and_gradient(q);
+    let mut residual = value - level;
     for _ in 0..STEP_LIMIT {
-        let gradient = surface.gradient(q);
         let slope2 = gradient.length_squared();
         // A step below the rounding of the coordinates cannot improve the point.
         let floor = 4.0 * f64::EPSILON * (q.abs().max_element() + f64::MIN_POSITIVE) * slope2.sqrt();
@@ -61,10 +61,10 @@ pub(super) fn project<S: LevelSet + ?Sized>(surface: &S, p: DVec3, level: f64) -
         let full = (-residual / slope2 * gradient).clamp_length_max(longest);
         match halved_until(|factor| {
             let candidate = q + factor * full;
-            let value = surface.value(candidate) - level;
-            (value.abs() < residual.abs()).then_some((candidate, value))
+            let (value, gradient) = surface.value_and_gradient(candidate);
+            ((value - level).abs() < residual.abs()).then_some((candidate, value - level, gradient))
         }) {
-            Some((candidate, value)) => (q, residual) = (candidate, value),
+            Some(better) => (q, residual, gradient) = better,
             // No step reduces the residual any more: it is rounding, or the search is stuck.
             None if residual.abs() <= 1e3 * floor => return Ok(q),
             None => return Err(failed()),

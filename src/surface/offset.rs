@@ -89,7 +89,7 @@ impl LevelSet for SignedDistance {
     }
 
     fn level_limits(&self) -> (f64, f64) {
-        let reach = reach(self.base.as_ref());
+        let reach = reach(self.base.as_ref(), 0.0);
         (-reach, reach)
     }
 
@@ -114,13 +114,13 @@ impl LevelSet for SignedDistance {
 /// Lines per axis for the search of the most curved place: fine enough to start in its basin.
 const REACH_LINES: usize = 24;
 
-/// How far `surface = 0` can be offset to both sides before an offset folds: the least radius of curvature on it.
+/// How far `surface = level` can be offset to both sides before an offset folds: the least radius of curvature on it.
 ///
 /// `f64::INFINITY` for a plane. Found by sampling and a compass search from the most curved sample, to about 1e-9
 /// relative. (An offset can also meet a far part of the surface before it folds; the finished mesh is tested for that.)
 #[must_use]
-pub fn reach(surface: &dyn LevelSet) -> f64 {
-    let samples = SurfaceSamples::new(surface, 0.0, REACH_LINES);
+pub fn reach(surface: &dyn LevelSet, level: f64) -> f64 {
+    let samples = SurfaceSamples::new(surface, level, REACH_LINES);
     let (_, most) = samples.maximise(surface, |p| surface.curvature(p).largest());
     if most > 0.0 { 1.0 / most } else { f64::INFINITY }
 }

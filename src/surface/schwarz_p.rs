@@ -29,6 +29,12 @@ impl LevelSet for SchwarzP {
         -k * DVec3::new((k * p.x).sin(), (k * p.y).sin(), (k * p.z).sin())
     }
 
+    fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let k = TAU / self.period;
+        let [x, y, z] = (k * p).to_array().map(f64::sin_cos);
+        (x.1 + y.1 + z.1, -k * DVec3::new(x.0, y.0, z.0))
+    }
+
     fn hessian(&self, p: DVec3) -> DMat3 {
         let k = TAU / self.period;
         DMat3::from_diagonal(-k * k * DVec3::new((k * p.x).cos(), (k * p.y).cos(), (k * p.z).cos()))
