@@ -6,6 +6,7 @@ use crate::{
     mesh,
     report::{
         enclosure as pages,
+        enclosure_drawing::base_figure,
         enclosure_section::section_figure,
         folder::{OutputFolder, write_whole},
     },
@@ -19,7 +20,6 @@ use std::{
     fs,
     io::{self, Write},
     path::{Path, PathBuf},
-    time::Instant,
 };
 
 /// Two shells with a gap for bees between them, and a base that holds them, as parts that print.
@@ -106,7 +106,6 @@ pub(super) fn run(arguments: &EnclosureArguments) -> Result<(), CliError> {
     if let Some(path) = &arguments.init {
         return init(path);
     }
-    let started = Instant::now();
     let (mut recipe, source) = read_recipe(arguments.recipe.as_deref())?;
     override_recipe(&mut recipe, arguments);
     let told = |fault: &Fault| tell(fault, &source);
@@ -115,27 +114,26 @@ pub(super) fn run(arguments: &EnclosureArguments) -> Result<(), CliError> {
     })?;
     let mut folder = OutputFolder::begin(&arguments.output)?;
     super::interrupt::remove_on_interrupt(folder.staging());
-    let bar = progress::steps(5);
-    bar.set_message("meshing");
+    let mut stages = progress::Stages::new(5);
+    stages.begin("meshing");
     let enclosure = Enclosure::build(design).map_err(|error| match error {
         BuildError::Recipe(fault) => CliError::mistake(anyhow!(told(&fault))),
         other => CliError::failure(other),
     })?;
-    bar.inc(1);
-    bar.set_message("inspecting");
+    stages.begin("inspecting");
     let (inspection, samples) = Inspection::new(&enclosure);
-    bar.inc(1);
-    bar.set_message("writing parts");
+    stages.begin("writing parts");
     write_parts(&mut folder, &enclosure, &arguments.format)?;
-    bar.inc(1);
-    bar.set_message("drawing");
+    stages.begin("drawing");
     pages::preview(&enclosure, &inspection)?.write_png(&mut folder, "preview", 1.0)?;
     section_figure(&enclosure, &inspection).write_png(&mut folder, "section", 1.0)?;
-    bar.inc(1);
-    bar.set_message("writing tables");
+    if let Some(plate) = &enclosure.plate {
+        base_figure(&enclosure.design.recipe, plate).write(&mut folder, "base", 1.0)?;
+    }
+    stages.begin("writing tables");
     pages::write_gap(&mut folder, &samples)?;
     folder.write_json("check.json", &inspection)?;
-    let seconds = started.elapsed().as_secs_f64();
+    let seconds = stages.finish();
     folder.write_json(
         "run.json",
         &json!({
@@ -147,10 +145,9 @@ pub(super) fn run(arguments: &EnclosureArguments) -> Result<(), CliError> {
             "ended": if inspection.sound { "sound" } else { "not sound" },
         }),
     )?;
-    bar.finish_and_clear();
     let files = folder.commit()?;
     print!("{}", pages::table(&inspection));
-    println!("{} files in {} after {seconds:.1} s", files.len(), arguments.output.display());
+    println!("{} files in {} after {:.1} s", files.len(), arguments.output.display(), seconds.values().sum::<f64>());
     if inspection.sound {
         Ok(())
     } else {

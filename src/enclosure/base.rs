@@ -11,8 +11,8 @@ use crate::{
 use glam::{DVec2, DVec3};
 use std::{collections::BTreeMap, f64::consts::TAU};
 
-/// Sides of the polygon that stands for a round hole: within 0.5 % of the circle.
-const HOLE_SIDES: u32 = 48;
+/// How far the polygon of a round hole may leave the circle, in mm: below what a printer resolves.
+const HOLE_SAGITTA: f64 = 0.02;
 
 /// Samples per period of the middle sheet that the entrances are laid out on: its arcs are good to 0.1 % of their length.
 const LAYOUT_SAMPLES: u32 = 64;
@@ -230,11 +230,12 @@ fn screws(count: u32, diameter: f64, low: DVec2, high: DVec2) -> Vec<DVec2> {
 }
 
 /// A regular polygon round the circle: the hole is at least as wide as said in every direction.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred sides at the most")]
 fn circle(centre: DVec2, radius: f64) -> Ring {
-    let around = radius / (0.5 * TAU / f64::from(HOLE_SIDES)).cos();
-    (0..HOLE_SIDES)
-        .map(|i| centre + around * DVec2::from_angle(TAU * f64::from(i) / f64::from(HOLE_SIDES)))
-        .collect()
+    let sides = (0.5 * TAU / (radius / (radius + HOLE_SAGITTA)).acos()).ceil().max(8.0) as u32;
+    let step = TAU / f64::from(sides);
+    let around = radius / (0.5 * step).cos();
+    (0..sides).map(|i| centre + around * DVec2::from_angle(step * f64::from(i))).collect()
 }
 
 /// Whether a hole keeps clear of all grooves.

@@ -83,7 +83,7 @@ pub struct Inspection {
 }
 
 /// Places at which the gap is sampled.
-const GAP_SAMPLES: usize = 20_000;
+const GAP_SAMPLES: usize = 10_000;
 
 /// Places at which a wall is sampled.
 const WALL_SAMPLES: usize = 5_000;

@@ -34,7 +34,10 @@ pub use region::Region;
 pub use shells::{Move, Shell, shell_from_level, shells};
 
 use crate::{
-    mesh::{ClosedMesh, Legs, MeshDefects, TriMesh, plate::PlateError},
+    mesh::{
+        ClosedMesh, Legs, MeshDefects, TriMesh,
+        plate::{Plate, PlateError},
+    },
     surface::{NoFoot, WallSide},
     units::Mm,
 };
@@ -81,6 +84,8 @@ pub struct Enclosure {
     pub design: Design,
     /// The parts: inner shell, outer shell, and the base if there is one.
     pub parts: Vec<PrintPart>,
+    /// The base's outlines, if there is a base.
+    pub plate: Option<Plate>,
     /// The fronts of the shells (the walls of the gap) in mm, in the frame of the shells: inner, outer.
     pub fronts: [TriMesh; 2],
     /// The backs of the shells, likewise.
@@ -108,11 +113,11 @@ impl Enclosure {
             let solid = shell.solid(legs)?.scaled_and_moved(design.period.0, frame.origin());
             parts.push(PrintPart { name, solid, expected_genus: genus });
         }
-        if let Some(plate) = plate {
+        if let Some(plate) = &plate {
             let expected_genus = i64::try_from(plate.holes.len()).unwrap_or(i64::MAX);
             parts.push(PrintPart { name: "base", solid: plate.solid()?, expected_genus });
         }
-        Ok(Self { design, parts, fronts, backs })
+        Ok(Self { design, parts, plate, fronts, backs })
     }
 
     /// Where each part stands on a sheet of all parts in a row, [`SPACING_MM`] apart.

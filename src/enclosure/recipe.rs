@@ -182,7 +182,7 @@ impl Default for BaseSection {
 
 impl Default for MeshSection {
     fn default() -> Self {
-        Self { samples: 256 }
+        Self { samples: 192 }
     }
 }
 

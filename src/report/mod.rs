@@ -8,9 +8,10 @@
 //! | a figure in SVG, and the same rasterised | `figure.rs` |
 //! | shaded triangles in a picture | `render.rs` |
 //! | colours that colour-blind readers tell apart | `palette.rs` |
-//! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs` |
+//! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
 
 pub mod enclosure;
+pub mod enclosure_drawing;
 pub mod enclosure_section;
 pub mod figure;
 pub mod folder;

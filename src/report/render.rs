@@ -173,9 +173,10 @@ impl Canvas {
     #[must_use]
     pub fn finish(&self) -> RgbImage {
         let columns = (self.width * SAMPLES) as usize;
+        let ring = self.ring();
         let lit: Vec<[f32; 3]> = (0..self.samples.len())
             .into_par_iter()
-            .map(|index| self.light(index % columns, index / columns))
+            .map(|index| self.light(index % columns, index / columns, &ring))
             .collect();
         let mut picture = RgbImage::new(self.width, self.height);
         #[expect(
@@ -199,9 +200,22 @@ impl Canvas {
         picture
     }
 
+    /// Places round a sample at which to look for what hides the sky: two rings.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "a few dozen samples wide")]
+    fn ring(&self) -> Vec<(isize, isize)> {
+        let widest = f64::from((self.height * SAMPLES / 60).max(3));
+        (0..24_i32)
+            .map(|step| {
+                let angle = f64::from(step) * std::f64::consts::TAU / 12.0;
+                let radius = if step < 12 { 0.35 * widest } else { widest };
+                ((radius * angle.cos()) as isize, (radius * angle.sin()) as isize)
+            })
+            .collect()
+    }
+
     /// The colour of one sample in light: a key light over the left shoulder, the sky's light from above, less of it in
     /// corners, and a dark line where the surface ends.
-    fn light(&self, column: usize, row: usize) -> [f32; 3] {
+    fn light(&self, column: usize, row: usize, ring: &[(isize, isize)]) -> [f32; 3] {
         let sample = self.samples[row * (self.width * SAMPLES) as usize + column];
         if sample.depth == f32::NEG_INFINITY {
             return [255.0; 3];
@@ -213,7 +227,7 @@ impl Canvas {
         let key = (self.camera.back + 0.6 * self.camera.up - 0.7 * self.camera.right).normalize();
         let diffuse = normal.dot(key).max(0.0);
         let sky = 0.5 + 0.5 * normal.dot(self.camera.up);
-        let (open, edge) = self.surroundings(column, row, sample.depth);
+        let (open, edge) = self.surroundings(column, row, sample.depth, ring);
         let gloss = normal.dot((key + self.camera.back).normalize()).max(0.0).powi(40);
         #[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
         let (light, shine) =
@@ -228,7 +242,7 @@ impl Canvas {
         clippy::cast_possible_truncation,
         reason = "places in a picture, clamped to it"
     )]
-    fn surroundings(&self, column: usize, row: usize, depth: f32) -> (f64, f64) {
+    fn surroundings(&self, column: usize, row: usize, depth: f32, ring: &[(isize, isize)]) -> (f64, f64) {
         let [columns, rows] = [(self.width * SAMPLES) as isize, (self.height * SAMPLES) as isize];
         let at = |dx: isize, dy: isize| {
             let x = (column as isize + dx).clamp(0, columns - 1);
@@ -236,25 +250,18 @@ impl Canvas {
             self.samples[(y * columns + x) as usize].depth
         };
         let reach = 0.05 * self.camera.half_height as f32;
-        let mut hidden = 0.0;
-        let ring = (rows / 60).max(3);
-        for step in 0..12_i32 {
-            let angle = f64::from(step) * std::f64::consts::TAU / 12.0;
-            for part in [0.35, 1.0] {
-                let radius = part * ring as f64;
-                let there = at((radius * angle.cos()) as isize, (radius * angle.sin()) as isize);
-                let above = there - depth;
-                if above > 0.1 * reach && above < 4.0 * reach {
-                    hidden += f64::from((above / reach).min(1.0)) / 24.0;
-                }
-            }
-        }
+        let hidden: f32 = ring
+            .iter()
+            .map(|&(dx, dy)| at(dx, dy) - depth)
+            .filter(|&above| above > 0.1 * reach && above < 4.0 * reach)
+            .map(|above| (above / reach).min(1.0) / ring.len() as f32)
+            .sum();
         let step = 0.3 * reach;
         let outline = [(2, 0), (-2, 0), (0, 2), (0, -2)].into_iter().any(|(dx, dy)| {
             let there = at(dx, dy);
             there == f32::NEG_INFINITY || depth - there > step + 4.0 * (depth - at(-dx, -dy)).abs()
         });
-        (1.0 - 0.75 * hidden, if outline { 0.45 } else { 1.0 })
+        (1.0 - 0.75 * f64::from(hidden), if outline { 0.45 } else { 1.0 })
     }
 }
 
