@@ -37,20 +37,37 @@ fn the_defaults_leave_parts_pictures_and_tables() -> Tested {
     let ran = combwright(&["enclosure", "--cells", "48", "--format", "ply,obj,glb"], home.path())?;
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
     let out = home.path().join("enclosure-out");
-    let mut files: Vec<String> =
-        fs::read_dir(&out)?.map(|e| e.map(|e| e.file_name().to_string_lossy().into_owned())).collect::<Result<_, _>>()?;
+    let mut files: Vec<String> = fs::read_dir(&out)?
+        .map(|e| e.map(|e| e.file_name().to_string_lossy().into_owned()))
+        .collect::<Result<_, _>>()?;
     files.sort();
     let expected = [
-        "base.ply", "base.png", "base.stl", "base.svg", "check.json", "enclosure.3mf", "enclosure.glb",
-        "enclosure.obj", "gap.csv", "inner-shell.ply", "inner-shell.stl", "outer-shell.ply", "outer-shell.stl",
-        "preview.png", "run.json", "section.png",
+        "base.ply",
+        "base.png",
+        "base.stl",
+        "base.svg",
+        "check.json",
+        "enclosure.3mf",
+        "enclosure.glb",
+        "enclosure.obj",
+        "gap.csv",
+        "inner-shell.ply",
+        "inner-shell.stl",
+        "outer-shell.ply",
+        "outer-shell.stl",
+        "preview.png",
+        "run.json",
+        "section.png",
     ];
     assert_eq!(files, expected);
     let check = check_of(&out)?;
     assert_sound(&check, "defaults");
     // At 48 cells chords lie up to h²κ/8 = 4.2² · 0.07 / 8 = 0.15 mm inside the walls on either side.
     let gap = &check["gap_mm"];
-    assert!((gap["min"].as_f64().unwrap_or(0.0) - 32.0).abs() < 0.3 && (gap["max"].as_f64().unwrap_or(0.0) - 32.0).abs() < 0.3);
+    assert!(
+        (gap["min"].as_f64().unwrap_or(0.0) - 32.0).abs() < 0.3
+            && (gap["max"].as_f64().unwrap_or(0.0) - 32.0).abs() < 0.3
+    );
     let table = String::from_utf8(ran.stdout)?;
     assert!(table.contains("gap") && table.contains("inner-shell") && table.contains("sound"), "{table}");
     Ok(())
@@ -190,7 +207,8 @@ fn mistakes_are_told_with_their_place_and_leave_nothing_behind() -> Tested {
             assert!(said.contains(word), "{arguments:?}: '{word}' is missing in: {said}");
         }
         assert!(!home.path().join("enclosure-out").exists(), "{arguments:?} left a folder");
-        let hidden = fs::read_dir(home.path())?.flatten().any(|e| e.file_name().to_string_lossy().starts_with('.'));
+        let hidden =
+            fs::read_dir(home.path())?.flatten().any(|e| e.file_name().to_string_lossy().starts_with('.'));
         assert!(!hidden, "{arguments:?} left temporary files");
     }
     Ok(())

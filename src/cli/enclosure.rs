@@ -147,7 +147,12 @@ pub(super) fn run(arguments: &EnclosureArguments) -> Result<(), CliError> {
     )?;
     let files = folder.commit()?;
     print!("{}", pages::table(&inspection));
-    println!("{} files in {} after {:.1} s", files.len(), arguments.output.display(), seconds.values().sum::<f64>());
+    println!(
+        "{} files in {} after {:.1} s",
+        files.len(),
+        arguments.output.display(),
+        seconds.values().sum::<f64>()
+    );
     if inspection.sound {
         Ok(())
     } else {

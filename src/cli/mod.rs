@@ -35,7 +35,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Build an enclosure: two shells with a gap for bees, and a base, as parts that print
-    Enclosure(enclosure::EnclosureArguments),
+    Enclosure(Box<enclosure::EnclosureArguments>),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout

@@ -230,7 +230,11 @@ fn screws(count: u32, diameter: f64, low: DVec2, high: DVec2) -> Vec<DVec2> {
 }
 
 /// A regular polygon round the circle: the hole is at least as wide as said in every direction.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred sides at the most")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a few hundred sides at the most"
+)]
 fn circle(centre: DVec2, radius: f64) -> Ring {
     let sides = (0.5 * TAU / (radius / (radius + HOLE_SAGITTA)).acos()).ceil().max(8.0) as u32;
     let step = TAU / f64::from(sides);

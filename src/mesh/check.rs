@@ -179,12 +179,12 @@ fn find_doubles(mesh: &TriMesh, opposites: &[u32], defects: &mut Vec<MeshDefect>
 fn find_pinches(mesh: &TriMesh, opposites: &[u32], defects: &mut Vec<MeshDefect>) {
     let mut corners = vec![0_u32; mesh.positions.len()];
     let mut first = vec![NONE; mesh.positions.len()];
-    for half_edge in 0..opposites.len() {
+    for (half_edge, &opposite) in opposites.iter().enumerate() {
         let (vertex, _) = ends(mesh, half_edge);
         corners[vertex.index()] += 1;
         let slot = &mut first[vertex.index()];
         // On a border start where the turn begins, so that it meets every corner of the fan.
-        if *slot == NONE || opposites[half_edge] == NONE {
+        if *slot == NONE || opposite == NONE {
             *slot = crate::index::checked_u32(half_edge);
         }
     }

@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 
 /// For each of the 256 cases the triangles, as edges of the cube; the normal points to the side above the level.
 pub(super) static CUBE_CASES: LazyLock<Vec<Vec<[u8; 3]>>> =
-    LazyLock::new(|| (0..=u8::MAX).map(|above| triangles(above)).collect());
+    LazyLock::new(|| (0..=u8::MAX).map(triangles).collect());
 
 /// The two ends of an edge of the cube, the lower coordinate first.
 pub(super) const fn edge_corners(edge: u8) -> [u8; 2] {

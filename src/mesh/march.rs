@@ -397,10 +397,9 @@ impl Slab {
 /// Moves the four bits of a column of corners (y, z) to the places of corners with x = 0.
 const SPREAD: [u8; 16] = {
     let mut table = [0; 16];
-    let mut column = 0;
+    let mut column = 0_u8;
     while column < 16 {
-        let bits = column as u8;
-        table[column] = (bits & 1) | (bits & 2) << 1 | (bits & 4) << 2 | (bits & 8) << 3;
+        table[column as usize] = (column & 1) | (column & 2) << 1 | (column & 4) << 2 | (column & 8) << 3;
         column += 1;
     }
     table

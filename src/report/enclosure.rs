@@ -93,9 +93,11 @@ const EYE: DVec3 = DVec3::new(-0.9, -2.0, 1.15);
 pub fn preview(enclosure: &Enclosure, inspection: &Inspection) -> Result<Figure, FigureError> {
     let mut drawing = Drawing::new(1500.0, 1180.0);
     let recipe = &enclosure.design.recipe;
+    let Spread { min, max, .. } = inspection.gap_mm;
+    let gap = if max - min < 0.1 { format!("{max:.1}") } else { format!("{min:.1} to {max:.1}") };
     let title = format!(
-        "{}: L = {} mm, gap {:.1} mm, walls {} mm",
-        recipe.name, recipe.cell.period, inspection.gap_mm.min, recipe.wall.thickness
+        "{}: L = {} mm, gap {gap} mm, walls {} mm",
+        recipe.name, recipe.cell.period, recipe.wall.thickness
     );
     drawing.text([30.0, 44.0], 26.0, Anchor::Start, INK, &title);
     let panel = 480;
@@ -144,7 +146,8 @@ fn picture_of(
                 let shaded = [0, 1, 2].map(|i| {
                     let smooth = normals[triangle[i].index()];
                     // At sharp edges the face's own normal; elsewhere the smooth one.
-                    let normal = if smooth.dot(face) > 0.8 { smooth } else { face };
+                    let rounded = part.name != "base" && smooth.dot(face) > 0.8;
+                    let normal = if rounded { smooth } else { face };
                     Corner { position: corners[i] + *by, normal }
                 });
                 canvas.triangle(shaded, colour_of(part.name), 1.0);

@@ -21,7 +21,13 @@ const DETAIL_SCALE: f64 = 26.0;
 #[must_use]
 pub fn base_figure(recipe: &Recipe, plate: &Plate) -> Figure {
     let mut drawing = Drawing::new(1300.0, 800.0);
-    drawing.text([PLAN[0], 44.0], 24.0, Anchor::Start, INK, &format!("{}: base (lengths in mm)", recipe.name));
+    drawing.text(
+        [PLAN[0], 44.0],
+        24.0,
+        Anchor::Start,
+        INK,
+        &format!("{}: base (lengths in mm)", recipe.name),
+    );
     plan(&mut drawing, recipe, plate);
     detail(&mut drawing, recipe);
     drawing.finish()
@@ -44,13 +50,20 @@ fn plan(drawing: &mut Drawing, recipe: &Recipe, plate: &Plate) {
     for pocket in &plate.pockets {
         drawing.area(&pocket.rings.iter().map(ring).collect::<Vec<_>>(), GREY, false);
     }
-    let lines = std::iter::once(&plate.outline).chain(plate.pockets.iter().flat_map(|p| &p.rings)).chain(&plate.holes);
+    let lines = std::iter::once(&plate.outline)
+        .chain(plate.pockets.iter().flat_map(|p| &p.rings))
+        .chain(&plate.holes);
     for line in lines.map(ring) {
         drawing.line(&[&line[..], &line[..1]].concat(), INK, 1.0);
     }
     let (bottom, right) = (to_sheet(&DVec2::new(0.0, low.y))[1] + 26.0, PLAN[0] + scale * size.x);
     dimension(drawing, [PLAN[0], bottom], [right, bottom], &format!("{:.1}", size.x));
-    dimension(drawing, [PLAN[0] - 26.0, to_sheet(&low)[1]], [PLAN[0] - 26.0, PLAN[1]], &format!("{:.1}", size.y));
+    dimension(
+        drawing,
+        [PLAN[0] - 26.0, to_sheet(&low)[1]],
+        [PLAN[0] - 26.0, PLAN[1]],
+        &format!("{:.1}", size.y),
+    );
     let base = &recipe.base;
     let mut notes = vec![format!("{} entrances Ø {}, through", base.entrances, base.entrance_diameter)];
     if base.screws > 0 {
@@ -101,7 +114,8 @@ fn detail(drawing: &mut Drawing, recipe: &Recipe) {
     let right = side + 18.0 / scale;
     dimension(drawing, to_sheet(right, below), to_sheet(right, 0.0), &format!("plate {}", base.thickness));
     let note = to_sheet(0.0, below - 34.0 / scale);
-    let text = format!("clearance {} on each side; the plate's upper face is the mirror plane", base.clearance);
+    let text =
+        format!("clearance {} on each side; the plate's upper face is the mirror plane", base.clearance);
     drawing.text(note, 15.0, Anchor::Middle, INK, &text);
 }
 

@@ -3,10 +3,10 @@
 use super::enclosure::CUT;
 use crate::{
     enclosure::{Enclosure, Inspection},
-    mesh::{CutPlane, SectionLine, section},
+    mesh::{Bvh, CutPlane, SectionLine, section},
     report::{
         figure::{Anchor, Drawing, Figure},
-        palette::{Colour, INK, viridis},
+        palette::{INK, viridis},
     },
 };
 use glam::{DVec2, DVec3};
@@ -122,14 +122,21 @@ fn draw_gap(
 ) {
     let lift = DVec2::new(0.0, enclosure.parts.first().map_or(0.0, |part| enclosure.assembled(part).z));
     let fronts = enclosure.fronts.each_ref().map(|mesh| section(mesh, plane));
-    let colour = |gap: f64| -> Colour { viridis((gap - range[0]) / (range[1] - range[0])) };
+    let trees = enclosure.fronts.each_ref().map(Bvh::new);
     for (from, to) in [(1, 0), (0, 1)] {
+        // The width is the nearest distance in space, which need not lie in the plane.
+        let width = |p: DVec2| {
+            trees[to]
+                .closest(plane.origin + p.x * plane.right + p.y * plane.up)
+                .map_or(f64::NAN, |c| c.distance)
+        };
         for line in &fronts[from] {
             let feet: Vec<DVec2> = line.points.iter().map(|&p| nearest(&fronts[to], p)).collect();
             for (points, feet) in line.points.windows(2).zip(feet.windows(2)) {
                 let quad = [points[0], points[1], feet[1], feet[0]].map(|p| to_sheet(p + lift)).to_vec();
-                let gap = 0.5 * (points[0].distance(feet[0]) + points[1].distance(feet[1]));
-                drawing.area(&[quad], colour(gap), true);
+                let colour =
+                    viridis((width(points[0].midpoint(points[1])) - range[0]) / (range[1] - range[0]));
+                drawing.area(&[quad], colour, true);
             }
         }
     }

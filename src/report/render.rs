@@ -201,7 +201,7 @@ impl Canvas {
     }
 
     /// Places round a sample at which to look for what hides the sky: two rings.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "a few dozen samples wide")]
+    #[expect(clippy::cast_possible_truncation, reason = "a few dozen samples wide")]
     fn ring(&self) -> Vec<(isize, isize)> {
         let widest = f64::from((self.height * SAMPLES / 60).max(3));
         (0..24_i32)
