@@ -61,17 +61,29 @@ pub(super) struct EnclosureArguments {
     #[arg(long, value_enum)]
     part: Option<PartName>,
     /// Cells along x, y and z, in steps of 0.5 (implies --part block)
-    #[arg(long, value_name = "NX,NY,NZ", value_delimiter = ',', num_args = 3)]
-    block: Option<Vec<f64>>,
+    #[arg(long, value_name = "NX,NY,NZ", value_parser = triple)]
+    block: Option<Triple>,
     /// The printer's bed, in mm
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3)]
-    bed: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple)]
+    bed: Option<Triple>,
     /// Shells alone, without a base
     #[arg(long)]
     no_base: bool,
     /// Further files of each part
     #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMAT,…")]
     format: Vec<Format>,
+}
+
+/// Three numbers with commas between them.
+#[derive(Clone, Copy, Debug)]
+struct Triple([f64; 3]);
+
+fn triple(text: &str) -> Result<Triple, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let numbers = numbers.map_err(|error| error.to_string())?;
+    <[f64; 3]>::try_from(numbers)
+        .map(Triple)
+        .map_err(|given| format!("three numbers are needed, as in 1,1,0.5; these are {}", given.len()))
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -236,12 +248,10 @@ fn override_recipe(recipe: &mut Recipe, arguments: &EnclosureArguments) {
             PartName::Octant => Part::Octant,
         };
     }
-    let triple =
-        |values: &Option<Vec<f64>>| values.as_ref().and_then(|v| <[f64; 3]>::try_from(v.as_slice()).ok());
-    if let Some(block) = triple(&arguments.block) {
+    if let Some(Triple(block)) = arguments.block {
         (recipe.cell.part, recipe.cell.block) = (Part::Block, Some(block));
     }
-    recipe.print.bed = triple(&arguments.bed).unwrap_or(recipe.print.bed);
+    recipe.print.bed = arguments.bed.map_or(recipe.print.bed, |Triple(bed)| bed);
     recipe.base.include &= !arguments.no_base;
 }
 
