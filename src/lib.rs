@@ -15,6 +15,7 @@
 //!
 //! The library prints nothing. The program `combwright` is built with the feature `cli`.
 
+pub mod comb;
 pub mod enclosure;
 pub mod index;
 pub mod mesh;

@@ -1,0 +1,78 @@
+//! Whether a cell counts, and how sure its count is.
+
+use super::{
+    evidence::Evidence,
+    kinds::{Kind, median},
+    read::Reading,
+};
+use crate::tessellation::CellStatus;
+use glam::DVec2;
+
+/// Least confidence with which a count counts.
+const LEAST_CONFIDENCE: f64 = 0.6;
+/// Least share of rays that meet a wall for the whole outline to be seen.
+const LEAST_CLOSURE: f64 = 0.85;
+/// Least rise to the wall, as a share of the photograph's median: textures of caps rise by half of it.
+const LEAST_RISE: f64 = 0.5;
+/// Chance that a side is right whose neighbour is hidden, and whose neighbour lies beyond the photograph.
+const HIDDEN_SIDE: f64 = 0.93;
+const SIDE_BEYOND: f64 = 0.985;
+/// Hidden neighbours that a complete cell may have: with two, a wall between them may end anywhere.
+const HIDDEN_NEIGHBOURS: usize = 1;
+/// No reading is surer than this.
+const GREATEST_CONFIDENCE: f64 = 0.995;
+/// A place beyond the comb that is this near to the border (in pitches) may be a cell of which little can be seen.
+const BORDER: f64 = 0.3;
+
+/// The status of one cell and the chance that its number of sides is right.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Standing {
+    pub(crate) status: CellStatus,
+    pub(crate) confidence: f64,
+}
+
+/// The standing of all places; that of places beyond the comb means nothing.
+pub(crate) fn standings(reading: &Reading) -> Vec<Standing> {
+    let seen = |i: &usize| reading.kinds[*i] == Kind::Seen;
+    let count = reading.centres.len();
+    let typical = median((0..count).filter(seen).map(|i| reading.evidence[i].rise));
+    (0..count).map(|cell| standing(reading, cell, typical)).collect()
+}
+
+fn standing(reading: &Reading, cell: usize, typical_rise: f64) -> Standing {
+    let neighbours = &reading.counts[cell].neighbours;
+    let of_kind = |kind| neighbours.iter().filter(move |n| reading.kinds[**n] == kind);
+    let hidden = of_kind(Kind::Hidden).count();
+    let (at_edge, beyond): (Vec<&usize>, Vec<&usize>) =
+        of_kind(Kind::Outside).partition(|n| well_inside(reading, **n));
+    let evidence = &reading.evidence[cell];
+    let doubt = HIDDEN_SIDE.powi(saturating(hidden)) * SIDE_BEYOND.powi(saturating(beyond.len()));
+    let confidence = (reading.counts[cell].confidence * doubt * evidence.closure).min(GREATEST_CONFIDENCE);
+    // The place of a neighbour that is not seen was inferred as if there were no defect: it cannot prove one.
+    let (odd, unseen) = (neighbours.len() != 6, hidden + beyond.len());
+    let status = if reading.kinds[cell] != Kind::Seen {
+        CellStatus::Uncertain
+    } else if reading.cut[cell] || !at_edge.is_empty() || hidden > HIDDEN_NEIGHBOURS {
+        CellStatus::Cut
+    } else if confidence < LEAST_CONFIDENCE || !is_plain(evidence, typical_rise) || (odd && unseen > 0) {
+        CellStatus::Uncertain
+    } else {
+        CellStatus::Complete
+    };
+    Standing { status, confidence }
+}
+
+fn is_plain(evidence: &Evidence, typical_rise: f64) -> bool {
+    evidence.closure >= LEAST_CLOSURE && evidence.rise >= LEAST_RISE * typical_rise
+}
+
+/// Whether a place beyond the comb lies within the photograph, so that a cell there would have been seen.
+fn well_inside(reading: &Reading, place: usize) -> bool {
+    let margin = DVec2::splat(BORDER * reading.pitches[place]);
+    let at = reading.centres[place];
+    at.cmpgt(margin).all() && at.cmplt(reading.size - margin).all()
+}
+
+fn saturating(count: usize) -> i32 {
+    i32::try_from(count).unwrap_or(i32::MAX)
+}

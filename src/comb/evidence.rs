@@ -1,0 +1,146 @@
+//! What the photograph shows of each cell: rays from its centre to its wall.
+
+use super::{plane::Plane, watershed::Segmentation};
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// Rays per cell.
+pub(crate) const RAYS: usize = 36;
+/// A ray's wall is looked for this far before and behind the region's edge, in pitches.
+const WALL_WINDOW: f64 = 0.1;
+/// A ray meets a wall if the relief rises by at least this from the cell's inside; a typical wall rises by 1.5 to 2.
+const WALL_RISE: f64 = 0.55;
+
+/// What the rays of one cell say.
+#[derive(Clone, Debug)]
+pub(crate) struct Evidence {
+    /// Distance from the centre to the region's edge along each ray, in pixels of the raster.
+    pub(crate) radii: [f64; RAYS],
+    /// Share of rays that end within the photograph, or meet the wall before they leave it.
+    pub(crate) visible: f64,
+    /// Share of those rays that meet a wall.
+    pub(crate) closure: f64,
+    /// Mean rise of the levelled relief from the inside to the wall.
+    pub(crate) rise: f64,
+    /// The same of the wall colour before the light was levelled.
+    pub(crate) contrast: f64,
+    /// Share of the middle that is clearly lower than the wall.
+    pub(crate) openness: f64,
+    /// Standard deviation of the distances to the rim over their mean: about 0.06 for a hexagonal opening.
+    pub(crate) unevenness: f64,
+}
+
+/// The rasters that the rays look at.
+pub(crate) struct Rasters<'a> {
+    /// Levelled, slightly smoothed.
+    pub(crate) relief: &'a Plane,
+    /// Wall colour as it is.
+    pub(crate) wallness: &'a Plane,
+    /// Who owns each pixel.
+    pub(crate) segmentation: &'a Segmentation,
+}
+
+/// Direction of a ray.
+pub(crate) fn direction(ray: usize) -> DVec2 {
+    DVec2::from_angle(ray as f64 / RAYS as f64 * std::f64::consts::TAU)
+}
+
+/// Evidence of every cell.
+pub(crate) fn gather(
+    rasters: &Rasters<'_>,
+    centres: &[DVec2],
+    insides: &[f64],
+    pitches: &[f64],
+) -> Vec<Evidence> {
+    (0..centres.len())
+        .into_par_iter()
+        .map(|cell| of_cell(rasters, cell, centres[cell], insides[cell], pitches[cell]))
+        .collect()
+}
+
+fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch: f64) -> Evidence {
+    let mut radii = [0.0; RAYS];
+    let mut rims = Vec::with_capacity(RAYS);
+    let (mut closed, mut rise, mut contrast) = (0.0, 0.0, 0.0);
+    let window = WALL_WINDOW * pitch;
+    let middle_raw = middle(rasters.wallness, centre, pitch);
+    for (ray, reached) in radii.iter_mut().enumerate() {
+        let step = direction(ray);
+        let radius = reach(rasters.segmentation, cell, centre, step, pitch);
+        let highest = |plane: &Plane| highest(plane, centre, step, radius - window, radius + window);
+        *reached = radius;
+        let height = highest(rasters.relief) - inside;
+        if !rasters.segmentation.holds(centre + step * (radius + 1.0)) && height < WALL_RISE {
+            continue;
+        }
+        rise += height;
+        contrast += highest(rasters.wallness) - middle_raw;
+        closed += f64::from(u8::from(height > WALL_RISE));
+        rims.push(rim(rasters.relief, centre, step, radius, inside + 0.5 * height));
+    }
+    let rays = (rims.len() as f64).max(1.0);
+    let (closed, rise, contrast) = (closed / rays, rise / rays, contrast / rays);
+    let mean = rims.iter().sum::<f64>() / rays;
+    let variance = rims.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / rays;
+    Evidence {
+        radii,
+        visible: rims.len() as f64 / RAYS as f64,
+        closure: closed,
+        rise,
+        contrast,
+        openness: openness(rasters.relief, centre, pitch, inside + 0.5 * rise),
+        unevenness: variance.sqrt() / mean.max(1e-9),
+    }
+}
+
+/// Mean over the middle of the cell.
+fn middle(plane: &Plane, centre: DVec2, pitch: f64) -> f64 {
+    let pixels = super::watershed::disc(centre, 0.28 * pitch, plane.width(), plane.height());
+    let (sum, count) = pixels.fold((0.0, 0.0), |(s, n), i| (s + f64::from(plane.data()[i]), n + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// Share of the middle below `level`.
+fn openness(plane: &Plane, centre: DVec2, pitch: f64, level: f64) -> f64 {
+    let pixels = super::watershed::disc(centre, 0.3 * pitch, plane.width(), plane.height());
+    let (low, count) = pixels.fold((0.0, 0.0), |(low, n), i| {
+        (low + f64::from(u8::from(f64::from(plane.data()[i]) < level)), n + 1.0)
+    });
+    if count > 0.0 { low / count } else { 0.0 }
+}
+
+/// How far the cell reaches along a ray.
+fn reach(segmentation: &Segmentation, cell: usize, centre: DVec2, step: DVec2, pitch: f64) -> f64 {
+    let mut radius = 0.0;
+    while radius < 1.2 * pitch {
+        if segmentation.at_point(centre + step * (radius + 0.5)) != Some(cell) {
+            break;
+        }
+        radius += 0.5;
+    }
+    radius
+}
+
+fn highest(plane: &Plane, centre: DVec2, step: DVec2, from: f64, to: f64) -> f64 {
+    let mut best = f64::NEG_INFINITY;
+    let mut radius = from.max(0.0);
+    while radius <= to {
+        let place = centre + step * radius;
+        best = best.max(f64::from(plane.sample(place.x, place.y)));
+        radius += 0.75;
+    }
+    best
+}
+
+/// Where the relief last rises above `level` on the way out: the rim of the opening.
+fn rim(plane: &Plane, centre: DVec2, step: DVec2, radius: f64, level: f64) -> f64 {
+    let mut distance = radius;
+    while distance > 0.5 {
+        let place = centre + step * distance;
+        if f64::from(plane.sample(place.x, place.y)) < level {
+            break;
+        }
+        distance -= 0.5;
+    }
+    distance
+}

@@ -1,0 +1,301 @@
+//! Which blobs are cells: those that continue a hexagonal lattice.
+//!
+//! Seeds are blobs in a regular hexagonal neighbourhood. From them the lattice grows: every open edge of a good triangle
+//! predicts the cell beyond it, by reflection. A blob near that place is taken as seen; where there is none, the cell is
+//! inferred, so that growth crosses what hides the comb (caps, bees, glare) and reaches blobs beyond. Blobs that no
+//! lattice reaches (leaves, texture of wood) are dropped.
+
+use super::{grid::Grid, peaks::Peak, triangulation::Delaunay};
+use glam::DVec2;
+
+/// Greatest deviation of a seed's six neighbour distances from their mean.
+const DISTANCE_SPREAD: f64 = 0.25;
+/// Least |ψ6| of a seed's neighbourhood: 1 for a perfect hexagon, about 0.4 for random points.
+const SEED_ORDER: f64 = 0.75;
+/// A seed's mean neighbour distance lies within this factor of the pitch.
+const PITCH_FACTOR: f64 = 1.4;
+/// Edges of a good triangle, in pitches.
+const GOOD_EDGE: (f64, f64) = (0.55, 1.55);
+/// A blob this near to its predicted place (in pitches) is the predicted cell.
+const SNAP: f64 = 0.38;
+/// Two cells are never nearer than this (in pitches).
+const CLOSEST: f64 = 0.58;
+/// Layers of inferred cells that may follow one another: half the width of the widest cap that is bridged.
+const INFERRED_LAYERS: usize = 7;
+
+/// The neighbourhood of a point that sits in a hexagonal lattice.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Neighbourhood {
+    /// Mean distance of its six neighbours.
+    pub(crate) distance: f64,
+}
+
+/// For each point, its neighbourhood if that is hexagonal at about the given pitch.
+pub(crate) fn hexagonal_neighbourhoods(points: &[DVec2], pitch: f64) -> Vec<Option<Neighbourhood>> {
+    let grid = Grid::of(points, pitch);
+    points
+        .iter()
+        .map(|point| {
+            let mut near: Vec<(usize, f64)> =
+                grid.within(*point, 1.8 * pitch).filter(|(_, squared)| *squared > 0.0).collect();
+            near.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            near.truncate(6);
+            let steps: Vec<DVec2> = near.iter().map(|(index, _)| points[*index] - *point).collect();
+            hexagonal(&steps, pitch)
+        })
+        .collect()
+}
+
+fn hexagonal(steps: &[DVec2], pitch: f64) -> Option<Neighbourhood> {
+    if steps.len() < 6 {
+        return None;
+    }
+    let distance = steps.iter().map(|s| s.length()).sum::<f64>() / 6.0;
+    let sixfold: DVec2 = steps.iter().map(|s| DVec2::from_angle(6.0 * s.to_angle())).sum();
+    let even = steps.iter().all(|s| (s.length() / distance - 1.0).abs() < DISTANCE_SPREAD);
+    let sized = distance < pitch * PITCH_FACTOR && distance * PITCH_FACTOR > pitch;
+    (even && sized && sixfold.length() / 6.0 > SEED_ORDER).then_some(Neighbourhood { distance })
+}
+
+/// The pitch as it varies over the photograph.
+#[derive(Clone, Debug)]
+pub(crate) struct PitchField {
+    bin: f64,
+    columns: usize,
+    rows: usize,
+    pitches: Vec<f64>,
+}
+
+impl PitchField {
+    /// From distances measured at points: Gaussian means over about two pitches, the overall pitch far from any.
+    pub(crate) fn new(size: DVec2, overall: f64, measured: &[(DVec2, f64)]) -> Self {
+        let bin = overall;
+        let cells = |length: f64| super::plane::pixels((length / bin).ceil()).max(1);
+        let (columns, rows) = (cells(size.x), cells(size.y));
+        let mut sums = vec![(0.0, 0.0); columns * rows];
+        let spread = 2.0 * overall;
+        for (point, distance) in measured {
+            let at = |value: f64, count: usize| super::plane::pixel(value, count);
+            let span = |v: f64, count: usize| {
+                at((v - 3.0 * spread) / bin, count)..=at((v + 3.0 * spread) / bin, count)
+            };
+            for row in span(point.y, rows) {
+                for column in span(point.x, columns) {
+                    let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5) * bin;
+                    let weight = (-0.5 * centre.distance_squared(*point) / (spread * spread)).exp();
+                    let (w, d) = &mut sums[row * columns + column];
+                    *w += weight;
+                    *d += weight * distance;
+                }
+            }
+        }
+        let prior = 0.2;
+        let pitches = sums.iter().map(|(w, d)| (d + prior * overall) / (w + prior)).collect();
+        Self { bin, columns, rows, pitches }
+    }
+
+    /// The pitch at a point.
+    pub(crate) fn at(&self, point: DVec2) -> f64 {
+        let column = super::plane::pixel(point.x / self.bin, self.columns);
+        let row = super::plane::pixel(point.y / self.bin, self.rows);
+        self.pitches[row * self.columns + column]
+    }
+}
+
+/// A place of the lattice.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Site {
+    /// Centre.
+    pub(crate) position: DVec2,
+    /// 0 where a blob was seen, else how many inferred layers lie between this place and a seen one.
+    pub(crate) depth: usize,
+    /// Whether a person says that there is a cell.
+    pub(crate) by_hand: bool,
+}
+
+impl Site {
+    const fn new(position: DVec2, depth: usize) -> Self {
+        Self { position, depth, by_hand: false }
+    }
+
+    /// A cell that a person has added.
+    pub(crate) const fn by_hand(position: DVec2) -> Self {
+        Self { position, depth: 0, by_hand: true }
+    }
+}
+
+/// Grows the lattice from the regular ones of `peaks`; `size` is that of the raster.
+pub(crate) fn grow(
+    peaks: &[Peak],
+    pitch: &PitchField,
+    seeds: &[bool],
+    size: DVec2,
+    layers: Layers,
+) -> Vec<Site> {
+    let mut growth = Growth::new(peaks, pitch, seeds, size);
+    while growth.accept_seen() {}
+    if layers == Layers::Inferred {
+        for layer in 1..=INFERRED_LAYERS {
+            if !growth.infer_layer(layer) {
+                break;
+            }
+            while growth.accept_seen() {}
+        }
+        growth.relax();
+    }
+    growth.sites
+}
+
+/// Whether growth crosses what hides the comb.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layers {
+    /// Only blobs that are seen.
+    Seen,
+    /// Inferred cells too.
+    Inferred,
+}
+
+struct Growth<'a> {
+    peaks: &'a [Peak],
+    peak_grid: Grid,
+    pitch: &'a PitchField,
+    size: DVec2,
+    sites: Vec<Site>,
+    taken: Vec<bool>,
+    site_grid: Grid,
+}
+
+/// A place predicted beyond an open edge of a good triangle.
+struct Prediction {
+    position: DVec2,
+    depth: usize,
+}
+
+impl<'a> Growth<'a> {
+    fn new(peaks: &'a [Peak], pitch: &'a PitchField, seeds: &[bool], size: DVec2) -> Self {
+        let positions: Vec<DVec2> = peaks.iter().map(|p| p.position).collect();
+        let edge = pitch.at(size / 2.0);
+        let mut growth = Self {
+            peaks,
+            peak_grid: Grid::of(&positions, edge),
+            pitch,
+            size,
+            sites: Vec::new(),
+            taken: vec![false; peaks.len()],
+            site_grid: Grid::new(edge),
+        };
+        for index in (0..peaks.len()).filter(|i| seeds[*i]) {
+            growth.take(index);
+        }
+        growth
+    }
+
+    fn take(&mut self, peak: usize) {
+        self.taken[peak] = true;
+        self.add(Site::new(self.peaks[peak].position, 0));
+    }
+
+    fn add(&mut self, site: Site) {
+        self.site_grid.insert(site.position, self.sites.len());
+        self.sites.push(site);
+    }
+
+    fn predictions(&self) -> Vec<Prediction> {
+        let points: Vec<DVec2> = self.sites.iter().map(|s| s.position).collect();
+        let delaunay = Delaunay::of(&points);
+        let mut found = Vec::new();
+        for ((a, b), thirds) in &delaunay.edges {
+            let good: Vec<usize> = thirds.iter().copied().filter(|c| self.is_good(*a, *b, *c)).collect();
+            if let [third] = good[..] {
+                let position = points[*a] + points[*b] - points[third];
+                let depth = self.sites[*a].depth.max(self.sites[*b].depth);
+                if self.is_free(position) {
+                    found.push(Prediction { position, depth });
+                }
+            }
+        }
+        found
+    }
+
+    fn is_good(&self, a: usize, b: usize, c: usize) -> bool {
+        let [a, b, c] = [a, b, c].map(|i| self.sites[i].position);
+        let pitch = self.pitch.at((a + b + c) / 3.0);
+        [a.distance(b), b.distance(c), c.distance(a)]
+            .iter()
+            .all(|d| (GOOD_EDGE.0 * pitch..=GOOD_EDGE.1 * pitch).contains(d))
+    }
+
+    fn is_free(&self, position: DVec2) -> bool {
+        let pitch = self.pitch.at(position);
+        let margin = DVec2::splat(0.6 * pitch);
+        let inside = position.cmpge(-margin).all() && position.cmple(self.size + margin).all();
+        inside && self.site_grid.nearest(position, CLOSEST * pitch).is_none()
+    }
+
+    /// Takes every free blob at a predicted place; whether there was any.
+    fn accept_seen(&mut self) -> bool {
+        let before = self.sites.len();
+        for prediction in self.predictions() {
+            let reach = SNAP * self.pitch.at(prediction.position);
+            let nearest = self.peak_grid.nearest(prediction.position, reach);
+            if let Some((peak, _)) = nearest
+                && !self.taken[peak]
+                && self.is_free(self.peaks[peak].position)
+            {
+                self.take(peak);
+            }
+        }
+        self.sites.len() > before
+    }
+
+    /// Adds a layer of inferred cells around all sites; whether there was any to add.
+    fn infer_layer(&mut self, layer: usize) -> bool {
+        let predictions = self.predictions();
+        let positions: Vec<DVec2> = predictions.iter().map(|p| p.position).collect();
+        let grid = Grid::of(&positions, self.pitch.at(self.size / 2.0));
+        let mut merged = Vec::new();
+        let mut used = vec![false; predictions.len()];
+        for (index, prediction) in predictions.iter().enumerate() {
+            if used[index] || prediction.depth >= INFERRED_LAYERS {
+                continue;
+            }
+            let reach = CLOSEST * self.pitch.at(prediction.position);
+            let mut sum = DVec2::ZERO;
+            let mut count = 0.0;
+            for (other, _) in grid.within(prediction.position, reach) {
+                if !used[other] {
+                    used[other] = true;
+                    sum += positions[other];
+                    count += 1.0;
+                }
+            }
+            merged.push(sum / count);
+        }
+        let before = self.sites.len();
+        for position in merged {
+            if self.is_free(position) {
+                self.add(Site::new(position, layer));
+            }
+        }
+        self.sites.len() > before
+    }
+
+    /// Moves inferred cells towards the mean of their neighbours, so that lattices that grew from two sides meet evenly.
+    fn relax(&mut self) {
+        for _ in 0..10 {
+            let points: Vec<DVec2> = self.sites.iter().map(|s| s.position).collect();
+            let neighbours = Delaunay::of(&points).neighbours(points.len());
+            for (index, site) in self.sites.iter_mut().enumerate() {
+                let near: Vec<DVec2> = neighbours[index]
+                    .iter()
+                    .map(|n| points[*n])
+                    .filter(|p| p.distance(points[index]) < GOOD_EDGE.1 * self.pitch.at(points[index]))
+                    .collect();
+                let enclosed = near.len() >= 5;
+                if site.depth > 0 && enclosed {
+                    site.position = near.iter().sum::<DVec2>() / near.len() as f64;
+                }
+            }
+        }
+    }
+}

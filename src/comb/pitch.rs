@@ -1,0 +1,142 @@
+//! The pitch of the comb, found from the photograph: the scale at which most of it looks like a hexagonal lattice.
+//!
+//! For each of a series of scales the photograph is brought to [`LEVEL_PITCH`] pixels per supposed pitch, band-passed, and
+//! its extrema are compared with a hexagonal neighbourhood. The score of a scale is the share of the photograph that such
+//! neighbourhoods cover. Dark cells show as minima and bright cells as maxima; the walls' corners are extrema of the other
+//! sign, but form a honeycomb lattice (three neighbours), which does not score.
+
+use super::{
+    lattice::hexagonal_neighbourhoods,
+    peaks::{self, Peak},
+    photo::{Part, Photo},
+    plane::{Plane, pixels},
+};
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// Pixels per pitch at which a scale is tried. Below 8 the walls are lost, above 12 it only costs time.
+const LEVEL_PITCH: f64 = 8.0;
+/// Ratio of one scale to the next: the band-pass accepts a lattice within 25 % of its own.
+const LEVEL_RATIO: f64 = 1.26;
+/// Smallest and largest pitch that are tried, in pixels of the photograph.
+const PITCHES: (f64, f64) = (7.0, 320.0);
+/// Pixels looked at per scale; a larger photograph is sampled by tiles.
+const LEVEL_AREA: f64 = 4.0e5;
+/// Edge of a tile in pixels of the level.
+const TILE: f64 = 200.0;
+
+/// Bright spots in the middle of dark cells make, with the walls' corners, a finer lattice of √3 times less pitch. So a lattice
+/// coarser by more than this factor is preferred if it covers this share of what the finer one does. A comb read at its
+/// right pitch shows nothing regular at coarser scales.
+const COARSER: f64 = 1.5;
+const SUPERLATTICE: f64 = 0.5;
+
+/// Whether cells are darker or brighter than their walls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Polarity {
+    /// Dark cells between bright walls.
+    DarkCells,
+    /// Bright cells between dark walls.
+    BrightCells,
+}
+
+impl Polarity {
+    /// +1 where bright means wall, −1 where dark means wall.
+    #[must_use]
+    pub(crate) const fn wall_sign(self) -> f32 {
+        match self {
+            Self::DarkCells => 1.0,
+            Self::BrightCells => -1.0,
+        }
+    }
+}
+
+/// What the search over scales found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PitchEstimate {
+    /// Median distance between neighbouring cells, in pixels of the photograph.
+    pub(crate) pitch: f64,
+    /// Whether cells are dark or bright.
+    pub(crate) polarity: Polarity,
+    /// Share of the photograph that looks like comb at this scale, 0..=1.
+    pub(crate) coverage: f64,
+}
+
+/// Finds the pitch at which `part` of the photograph looks most like comb; `None` where nothing can be tried.
+#[must_use]
+pub(crate) fn find(photo: &Photo, part: Part, hint: Option<f64>) -> Option<PitchEstimate> {
+    let tried: Vec<PitchEstimate> =
+        levels(part, hint).into_par_iter().flat_map_iter(|pitch| at_level(photo, part, pitch)).collect();
+    let greatest = |among: &mut dyn Iterator<Item = &PitchEstimate>| {
+        among.copied().max_by(|a, b| a.coverage.total_cmp(&b.coverage))
+    };
+    let best = greatest(&mut tried.iter())?;
+    let coarser = greatest(&mut tried.iter().filter(|t| t.pitch > COARSER * best.pitch));
+    Some(coarser.filter(|c| c.coverage > SUPERLATTICE * best.coverage).unwrap_or(best))
+}
+
+fn levels(part: Part, hint: Option<f64>) -> Vec<f64> {
+    let largest = part.width.min(part.height) as f64 / 2.5;
+    let (from, to) = hint.map_or(PITCHES, |h| (h * 0.9, h * 1.12));
+    let mut pitches = Vec::new();
+    let mut pitch = from;
+    while pitch <= to.min(largest) {
+        pitches.push(pitch);
+        pitch *= if hint.is_some() { 1.1 } else { LEVEL_RATIO };
+    }
+    pitches
+}
+
+fn at_level(photo: &Photo, part: Part, pitch: f64) -> [PitchEstimate; 2] {
+    let scale = LEVEL_PITCH / pitch;
+    let mut found = [Vec::new(), Vec::new()];
+    let mut area = 0.0;
+    for tile in tiles(part, scale) {
+        let size = |length: usize| pixels(length as f64 * scale).max(4);
+        let colours = photo.resampled(tile, size(tile.width), size(tile.height));
+        let grey = colours.grey();
+        area += (grey.width() * grey.height()) as f64;
+        for (sign, distances) in [1.0, -1.0].into_iter().zip(&mut found) {
+            distances.extend(neighbour_distances(&grey, sign));
+        }
+    }
+    let estimate = |polarity, mut distances: Vec<f64>| {
+        distances.sort_by(f64::total_cmp);
+        let covered: f64 = distances.iter().map(|d| d * d * 0.75_f64.sqrt()).sum();
+        let median = distances.get(distances.len() / 2).copied().unwrap_or(LEVEL_PITCH);
+        PitchEstimate { pitch: median / scale, polarity, coverage: covered / area.max(1.0) }
+    };
+    let [dark, bright] = found;
+    [estimate(Polarity::DarkCells, dark), estimate(Polarity::BrightCells, bright)]
+}
+
+/// Mean neighbour distance of every extremum that sits in a hexagonal neighbourhood.
+fn neighbour_distances(grey: &Plane, sign: f32) -> Vec<f64> {
+    let response = peaks::band_pass(&grey.map(|v| -sign * v), LEVEL_PITCH);
+    let found: Vec<Peak> = peaks::maxima(&response, 0.4);
+    let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
+    hexagonal_neighbourhoods(&points, LEVEL_PITCH).iter().flatten().map(|n| n.distance).collect()
+}
+
+/// Tiles spread evenly over `part`, together no more than [`LEVEL_AREA`] at this scale.
+fn tiles(part: Part, scale: f64) -> Vec<Part> {
+    let area = (part.width * part.height) as f64 * scale * scale;
+    if area <= LEVEL_AREA {
+        return vec![part];
+    }
+    let edge = pixels(TILE / scale);
+    let per_axis = (LEVEL_AREA / (TILE * TILE)).sqrt();
+    let count = |length: usize| pixels(per_axis).min(length / edge).max(1);
+    let (columns, rows) = (count(part.width), count(part.height));
+    let start =
+        |k: usize, count: usize, length: usize| (length.saturating_sub(edge)) * (2 * k + 1) / (2 * count);
+    (0..rows)
+        .flat_map(|r| (0..columns).map(move |c| (c, r)))
+        .map(|(c, r)| Part {
+            left: part.left + start(c, columns, part.width),
+            top: part.top + start(r, rows, part.height),
+            width: edge.min(part.width),
+            height: edge.min(part.height),
+        })
+        .collect()
+}

@@ -1,0 +1,268 @@
+//! A raster of `f32` and the few filters that the reading needs.
+//!
+//! Every filter treats what lies outside the raster as unknown, not as dark: a mean near the border is the mean of the
+//! pixels that are there. Sums run in a fixed order within fixed bands, so that results do not depend on the number of
+//! threads.
+
+use rayon::prelude::*;
+
+/// Rows that one task works on; fixed, so that sums are the same for any number of threads.
+const BAND: usize = 128;
+
+/// A raster of `f32`, row by row from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Plane {
+    width: usize,
+    height: usize,
+    data: Vec<f32>,
+}
+
+impl Plane {
+    /// A raster of one value.
+    #[must_use]
+    pub(crate) fn new(width: usize, height: usize, value: f32) -> Self {
+        Self { width, height, data: vec![value; width * height] }
+    }
+
+    /// A raster whose value at (x, y) is `value(x, y)`.
+    #[must_use]
+    pub(crate) fn from_fn(width: usize, height: usize, value: impl Fn(usize, usize) -> f32 + Sync) -> Self {
+        let mut plane = Self::new(width, height, 0.0);
+        plane.fill_rows(|y, row| {
+            for (x, v) in row.iter_mut().enumerate() {
+                *v = value(x, y);
+            }
+        });
+        plane
+    }
+
+    /// Width in pixels.
+    #[must_use]
+    pub(crate) const fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    #[must_use]
+    pub(crate) const fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The values, row by row.
+    #[must_use]
+    pub(crate) fn data(&self) -> &[f32] {
+        &self.data
+    }
+
+    /// The value at (x, y).
+    ///
+    /// # Panics
+    /// If the pixel is outside.
+    #[must_use]
+    pub(crate) fn at(&self, x: usize, y: usize) -> f32 {
+        self.data[y * self.width + x]
+    }
+
+    /// The value at a point, bilinear between pixel centres (pixel (0, 0) covers 0 ≤ x, y < 1), clamped at the border.
+    #[must_use]
+    pub(crate) fn sample(&self, x: f64, y: f64) -> f32 {
+        let (x0, x1, fx) = bracket(x - 0.5, self.width);
+        let (y0, y1, fy) = bracket(y - 0.5, self.height);
+        let top = self.at(x0, y0) * (1.0 - fx) + self.at(x1, y0) * fx;
+        let bottom = self.at(x0, y1) * (1.0 - fx) + self.at(x1, y1) * fx;
+        top * (1.0 - fy) + bottom * fy
+    }
+
+    /// A raster of `f(value)`.
+    #[must_use]
+    pub(crate) fn map(&self, f: impl Fn(f32) -> f32 + Sync) -> Self {
+        let mut out = self.clone();
+        out.data.par_iter_mut().for_each(|v| *v = f(*v));
+        out
+    }
+
+    /// A raster of `f(value, other value)`.
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    #[must_use]
+    pub(crate) fn zip(&self, other: &Self, f: impl Fn(f32, f32) -> f32 + Sync) -> Self {
+        assert!(self.width == other.width && self.height == other.height, "planes of different size");
+        let mut out = self.clone();
+        out.data.par_iter_mut().zip(&other.data).for_each(|(a, b)| *a = f(*a, *b));
+        out
+    }
+
+    /// Gaussian mean of standard deviation `sigma` pixels, over the pixels that exist.
+    ///
+    /// Narrow ones are summed directly; wide ones are three running means (within 3 % of the Gaussian), whose cost does
+    /// not depend on `sigma`.
+    #[must_use]
+    pub(crate) fn blurred(&self, sigma: f64) -> Self {
+        if sigma < 0.3 {
+            return self.clone();
+        }
+        if sigma <= 2.5 {
+            return self.convolved(&gaussian(sigma));
+        }
+        box_radii(sigma).iter().fold(self.clone(), |plane, radius| plane.box_mean(*radius))
+    }
+
+    fn fill_rows(&mut self, fill: impl Fn(usize, &mut [f32]) + Sync) {
+        let width = self.width.max(1);
+        self.data.par_chunks_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
+    }
+
+    /// Separable convolution with a symmetric kernel given from its centre outward.
+    fn convolved(&self, half: &[f32]) -> Self {
+        let across = self.convolved_rows(half);
+        across.convolved_columns(half)
+    }
+
+    fn convolved_rows(&self, half: &[f32]) -> Self {
+        let (width, reach) = (self.width, half.len() - 1);
+        let mut out = self.clone();
+        out.fill_rows(|y, row| {
+            let source = &self.data[y * width..(y + 1) * width];
+            for (x, v) in row.iter_mut().enumerate() {
+                if x >= reach && x + reach < width {
+                    let window = &source[x - reach..=x + reach];
+                    *v = half[0] * window[reach]
+                        + (1..=reach).map(|k| half[k] * (window[reach - k] + window[reach + k])).sum::<f32>();
+                } else {
+                    *v = border_mean(half, x, width, |k| source[k]);
+                }
+            }
+        });
+        out
+    }
+
+    fn convolved_columns(&self, half: &[f32]) -> Self {
+        let (width, height, reach) = (self.width, self.height, half.len() - 1);
+        let mut out = Self::new(width, height, 0.0);
+        out.fill_rows(|y, row| {
+            let first = y.saturating_sub(reach);
+            let last = (y + reach).min(height - 1);
+            let total: f32 = (first..=last).map(|k| half[k.abs_diff(y)]).sum();
+            for k in first..=last {
+                let weight = half[k.abs_diff(y)] / total;
+                for (v, s) in row.iter_mut().zip(&self.data[k * width..(k + 1) * width]) {
+                    *v += weight * s;
+                }
+            }
+        });
+        out
+    }
+
+    /// Mean over the square of the given radius, clipped to the raster.
+    fn box_mean(&self, radius: usize) -> Self {
+        self.box_rows(radius).box_columns(radius)
+    }
+
+    fn box_rows(&self, radius: usize) -> Self {
+        let width = self.width;
+        let mut out = self.clone();
+        out.fill_rows(|y, row| {
+            let source = &self.data[y * width..(y + 1) * width];
+            let mut sum: f64 = source[..radius.min(width)].iter().map(|v| f64::from(*v)).sum();
+            for (x, v) in row.iter_mut().enumerate() {
+                if x + radius < width {
+                    sum += f64::from(source[x + radius]);
+                }
+                if x > radius {
+                    sum -= f64::from(source[x - radius - 1]);
+                }
+                let count = (x + radius).min(width - 1) - x.saturating_sub(radius) + 1;
+                *v = narrow(sum / count as f64);
+            }
+        });
+        out
+    }
+
+    fn box_columns(&self, radius: usize) -> Self {
+        let (width, height) = (self.width, self.height);
+        let row_of = |y: usize| &self.data[y * width..(y + 1) * width];
+        let mut out = Self::new(width, height, 0.0);
+        out.data.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, rows)| {
+            let start = band * BAND;
+            let mut sum = vec![0.0_f64; width];
+            for y in start.saturating_sub(radius)..(start + radius).min(height) {
+                sum.iter_mut().zip(row_of(y)).for_each(|(s, v)| *s += f64::from(*v));
+            }
+            for (offset, row) in rows.chunks_mut(width).enumerate() {
+                let y = start + offset;
+                if y + radius < height {
+                    sum.iter_mut().zip(row_of(y + radius)).for_each(|(s, v)| *s += f64::from(*v));
+                }
+                if offset > 0 && y > radius {
+                    sum.iter_mut().zip(row_of(y - radius - 1)).for_each(|(s, v)| *s -= f64::from(*v));
+                }
+                let count = ((y + radius).min(height - 1) - y.saturating_sub(radius) + 1) as f64;
+                row.iter_mut().zip(&sum).for_each(|(v, s)| *v = narrow(s / count));
+            }
+        });
+        out
+    }
+}
+
+/// `value` in single precision, which is enough for grey values.
+#[expect(clippy::cast_possible_truncation, reason = "grey values need no more than 24 bits")]
+#[must_use]
+pub(crate) const fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+/// The pixel that holds a coordinate, clamped to `0..size`.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the raster before the cast"
+)]
+#[must_use]
+pub(crate) fn pixel(coordinate: f64, size: usize) -> usize {
+    coordinate.clamp(0.0, size.saturating_sub(1) as f64) as usize
+}
+
+/// A non-negative length as a number of pixels, rounded.
+#[must_use]
+pub(crate) fn pixels(length: f64) -> usize {
+    pixel(length.round(), usize::MAX >> 12)
+}
+
+fn bracket(x: f64, size: usize) -> (usize, usize, f32) {
+    let clamped = x.clamp(0.0, size.saturating_sub(1) as f64);
+    let low = pixel(clamped, size);
+    (low, (low + 1).min(size - 1), narrow(clamped - low as f64))
+}
+
+fn border_mean(half: &[f32], x: usize, size: usize, value: impl Fn(usize) -> f32) -> f32 {
+    let reach = half.len() - 1;
+    let (mut sum, mut total) = (0.0, 0.0);
+    for k in x.saturating_sub(reach)..=(x + reach).min(size - 1) {
+        sum += half[k.abs_diff(x)] * value(k);
+        total += half[k.abs_diff(x)];
+    }
+    sum / total
+}
+
+/// Half of a Gaussian kernel, from its centre outward to 3 σ, of total 1.
+fn gaussian(sigma: f64) -> Vec<f32> {
+    let reach = pixels((3.0 * sigma).ceil());
+    let weights: Vec<f64> = (0..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+    let total = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
+    weights.iter().map(|w| narrow(w / total)).collect()
+}
+
+/// Radii of three running means whose variances add up to σ² as nearly as whole numbers allow.
+fn box_radii(sigma: f64) -> [usize; 3] {
+    let variance = |radius: f64| ((2.0 * radius + 1.0).powi(2) - 1.0) / 12.0;
+    let mut radii = [0; 3];
+    let mut left = sigma * sigma;
+    for (done, radius) in radii.iter_mut().enumerate() {
+        let share = left / (3 - done) as f64;
+        let ideal = ((12.0 * share + 1.0).max(1.0).sqrt() - 1.0) / 2.0;
+        *radius = pixels(ideal);
+        left -= variance(*radius as f64);
+    }
+    radii
+}

@@ -1,0 +1,303 @@
+//! From photograph to cells: the steps in order.
+
+use super::{
+    CorrectionError, Settings, distance,
+    evidence::{self, Evidence, Rasters},
+    kinds::{self, Kind, median},
+    lattice::{self, Layers, PitchField, Site, hexagonal_neighbourhoods},
+    light::{WallColour, levelled},
+    peaks::{self, Peak},
+    photo::{Colours, Part, Photo},
+    pitch::PitchEstimate,
+    plane::{Plane, narrow, pixel, pixels},
+    sides::{self, Cells, Count},
+    triangulation::Delaunay,
+    walls::{self, Region, Wall},
+    watershed::{self, Segmentation},
+};
+use glam::DVec2;
+use std::collections::BTreeMap;
+
+/// Pixels per pitch that the reading works at: larger photographs are reduced to it. At 36 a wall of a tenth of the pitch
+/// is 3 to 4 pixels long, which is enough to see it; more costs time and shows more of the wax's grain.
+const WORK_PITCH: f64 = 36.0;
+/// Smaller photographs are enlarged to this, so that a wall is more than one pixel wide.
+const LEAST_WORK_PITCH: f64 = 24.0;
+/// Below this many pixels per cell the photograph is refused: walls are no longer resolved.
+pub const LEAST_PITCH: f64 = 11.0;
+/// Share of the photograph that must look like comb.
+pub(crate) const LEAST_COVERAGE: f64 = 0.012;
+/// Smoothing of the relief, in pitches.
+const RELIEF_BLUR: f64 = 0.03;
+/// Relief above which a pixel is wall, between the cells' inside (about −0.7) and the walls' crest (about +1.2).
+const WALL_LEVEL: f32 = 0.4;
+/// Height per pitch of distance from the openings that is added to walls, so that thick wax is shared in the middle.
+const WALL_SLOPE: f64 = 10.0;
+
+/// Brightness below which differences are noise, when contrast is taken as a ratio.
+const DARKEST: f32 = 0.02;
+/// Least contrast of a blob as a share of the regular ones' median.
+const LEAST_RATIO: f64 = 0.3;
+/// Two halves of one wide cell: no wall of more than this share of the usual rise between them, together no larger than
+/// this many cells, and nearer than this many pitches. Two cells are 2 in area and 1 in distance.
+const HALVES_RISE: f64 = 0.55;
+const HALVES_AREA: f64 = 1.65;
+const HALVES_DISTANCE: f64 = 0.78;
+
+/// Seen cells below which there is no comb.
+pub(crate) const LEAST_CELLS: usize = 7;
+
+/// The reading of a photograph at working scale; all lists are indexed by the places of the lattice.
+pub(crate) struct Reading {
+    /// Pixels of the working raster per pixel of the photograph.
+    pub(crate) scale: f64,
+    /// Centres of the cells.
+    pub(crate) centres: Vec<DVec2>,
+    /// What the segmentation gave each.
+    pub(crate) regions: Vec<Region>,
+    /// Walls between two of them, lower index first.
+    pub(crate) walls: BTreeMap<(usize, usize), Wall>,
+    /// What the photograph shows of each.
+    pub(crate) evidence: Vec<Evidence>,
+    /// Seen, hidden or beyond the comb.
+    pub(crate) kinds: Vec<Kind>,
+    /// Whether the border, a mask or nothing cuts the cell.
+    pub(crate) cut: Vec<bool>,
+    /// Neighbours and doubts.
+    pub(crate) counts: Vec<Count>,
+    /// Local pitch.
+    pub(crate) pitches: Vec<f64>,
+    /// Size of the working raster.
+    pub(crate) size: DVec2,
+}
+
+impl Reading {
+    /// The number of cells that are seen.
+    pub(crate) fn seen(&self) -> usize {
+        self.kinds.iter().filter(|k| **k == Kind::Seen).count()
+    }
+
+    /// Whether a point lies on the raster.
+    pub(crate) fn holds(&self, point: DVec2) -> bool {
+        point.cmpge(DVec2::ZERO).all() && point.cmplt(self.size).all()
+    }
+
+    /// Length of the wall between two cells in pixels of the raster; 0 where the segmentation has none.
+    pub(crate) fn wall_length(&self, a: usize, b: usize) -> f64 {
+        self.walls.get(&(a.min(b), a.max(b))).map_or(0.0, |w| w.length)
+    }
+}
+
+/// Light levelled, blobs found, lattice grown.
+struct Survey {
+    wallness: Plane,
+    relief: Plane,
+    sites: Vec<Site>,
+    field: PitchField,
+}
+
+/// Factor from the photograph to the working raster.
+fn scale_for(pitch: f64) -> f64 {
+    if pitch > WORK_PITCH {
+        WORK_PITCH / pitch
+    } else if pitch < LEAST_WORK_PITCH {
+        LEAST_WORK_PITCH / pitch
+    } else {
+        1.0
+    }
+}
+
+/// Reads the cells of a part of a photograph, whose pitch is known.
+pub(crate) fn read(
+    photo: &Photo,
+    part: Part,
+    estimate: PitchEstimate,
+    settings: &Settings,
+) -> Result<Reading, CorrectionError> {
+    let scale = scale_for(estimate.pitch);
+    let pitch = estimate.pitch * scale;
+    let sign = estimate.polarity.wall_sign();
+    let colours =
+        photo.resampled(part, pixels(part.width as f64 * scale), pixels(part.height as f64 * scale));
+    let brightness = WallColour::brightness(estimate.polarity);
+    let first = survey(&colours, brightness, sign, pitch, Layers::Seen);
+    let colour = learned_colour(&colours, &first, pitch).unwrap_or(brightness);
+    let mut survey = survey(&colours, colour, sign, pitch, Layers::Inferred);
+    let origin = DVec2::new(part.left as f64, part.top as f64);
+    let to_raster = |point: DVec2| (point - origin) * scale;
+    settings.corrections.place(&mut survey.sites, to_raster, pitch)?;
+    let joined = settings.corrections.joined(&survey.sites, to_raster, pitch)?;
+    let hidden = hidden(settings, &survey.relief, part, scale);
+    if let Some(hidden) = &hidden {
+        let width = survey.relief.width();
+        let at = |p: DVec2| pixel(p.y, survey.relief.height()) * width + pixel(p.x, width);
+        survey.sites.retain(|site| !hidden[at(site.position)]);
+    }
+    let segmented = segment(&survey, pitch, hidden.as_deref(), &joined);
+    Ok(count(&survey, segmented, scale))
+}
+
+/// Which pixels of the raster the mask or a correction hides.
+fn hidden(settings: &Settings, raster: &Plane, part: Part, scale: f64) -> Option<Vec<bool>> {
+    if settings.mask.is_none() && !settings.corrections.masks() {
+        return None;
+    }
+    let hides = |x: usize, y: usize| {
+        let place = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) / scale;
+        let (u, v) = (part.left + pixel(place.x, part.width), part.top + pixel(place.y, part.height));
+        let point = place + DVec2::new(part.left as f64, part.top as f64);
+        settings.mask.as_ref().is_some_and(|m| m.hides(u, v)) || settings.corrections.hides(point)
+    };
+    let width = raster.width();
+    Some((0..width * raster.height()).map(|i| hides(i % width, i / width)).collect())
+}
+
+/// Drops blobs whose contrast, as a ratio of brightness, is far below that of the regular ones: levelling the light also
+/// levels up the texture of caps and of the ground.
+fn clear(found: Vec<Peak>, colours: &Colours, sign: f32, pitch: f64) -> Vec<Peak> {
+    let ratio = peaks::difference(&colours.grey().map(|v| -sign * (v + DARKEST).ln()), pitch);
+    let contrast = |p: &Peak| f64::from(ratio.sample(p.position.x, p.position.y));
+    let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
+    let regular = hexagonal_neighbourhoods(&points, pitch);
+    let typical = median(found.iter().zip(&regular).filter(|(_, n)| n.is_some()).map(|(p, _)| contrast(p)));
+    found.into_iter().filter(|p| contrast(p) > LEAST_RATIO * typical).collect()
+}
+
+fn survey(colours: &Colours, colour: WallColour, sign: f32, pitch: f64, layers: Layers) -> Survey {
+    let wallness = colour.of(colours);
+    let relief = levelled(&wallness, pitch);
+    let response = peaks::band_pass(&relief.map(|v| -v), pitch);
+    let found =
+        clear(peaks::thinned(peaks::maxima(&response, 0.15), |_| 0.5 * pitch, pitch), colours, sign, pitch);
+    let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
+    let regular = hexagonal_neighbourhoods(&points, pitch);
+    let measured: Vec<(DVec2, f64)> =
+        regular.iter().zip(&points).filter_map(|(n, p)| n.map(|n| (*p, n.distance))).collect();
+    let size = DVec2::new(wallness.width() as f64, wallness.height() as f64);
+    let field = PitchField::new(size, pitch, &measured);
+    let seeds: Vec<bool> = regular.iter().zip(&found).map(|(n, p)| n.is_some() && p.strength > 0.4).collect();
+    let sites = lattice::grow(&found, &field, &seeds, size, layers);
+    Survey { wallness, relief, sites, field }
+}
+
+/// The wall colour, from the highest points between neighbouring cells against the cells' middles.
+fn learned_colour(colours: &Colours, survey: &Survey, pitch: f64) -> Option<WallColour> {
+    let seen: Vec<DVec2> = survey.sites.iter().filter(|s| s.depth == 0).map(|s| s.position).collect();
+    let crest = |a: DVec2, b: DVec2| {
+        (0..9)
+            .map(|k| a.lerp(b, 0.3 + 0.05 * f64::from(k)))
+            .max_by(|p, q| survey.relief.sample(p.x, p.y).total_cmp(&survey.relief.sample(q.x, q.y)))
+    };
+    let walls: Vec<DVec2> = Delaunay::of(&seen)
+        .edges
+        .keys()
+        .map(|(a, b)| (seen[*a], seen[*b]))
+        .filter(|(a, b)| a.distance(*b) < 1.3 * pitch)
+        .filter_map(|(a, b)| crest(a, b))
+        .collect();
+    WallColour::learned(colours, &walls, &seen)
+}
+
+struct Segmented {
+    segmentation: Segmentation,
+    relief: Plane,
+    centres: Vec<DVec2>,
+    markers: Vec<DVec2>,
+    by_hand: Vec<bool>,
+    pitches: Vec<f64>,
+    regions: Vec<Region>,
+    walls: BTreeMap<(usize, usize), Wall>,
+}
+
+fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usize, usize)]) -> Segmented {
+    let relief = survey.relief.blurred(RELIEF_BLUR * pitch);
+    let thickness = distance::to_nearest(&relief, |v| v < WALL_LEVEL);
+    let slope = narrow(WALL_SLOPE / pitch);
+    let heights = relief.zip(&thickness, |r, d| r.min(WALL_LEVEL) + slope * d);
+    let mut centres: Vec<DVec2> = survey.sites.iter().map(|s| s.position).collect();
+    let pitches: Vec<f64> = centres.iter().map(|c| survey.field.at(*c)).collect();
+    let first = watershed::flood(&heights, &centres, &pitches, hidden);
+    let regions = walls::regions(&first, &relief, &centres, &pitches);
+    for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
+        if site.depth == 0 && region.area > 0.0 && region.on_border == 0 {
+            *centre = region.centroid;
+        }
+    }
+    let mut segmentation = watershed::flood(&heights, &centres, &pitches, hidden);
+    let regions = walls::regions(&segmentation, &relief, &centres, &pitches);
+    let walls = walls::walls(&segmentation, &relief, &regions);
+    let mut into = halves(&survey.sites, &regions, &walls, &pitches);
+    for (a, b) in joined {
+        into[*b] = into[*a];
+    }
+    let kept: Vec<usize> = (0..into.len()).filter(|i| into[*i] == *i).collect();
+    let mut place = vec![0; into.len()];
+    for (new, old) in kept.iter().enumerate() {
+        place[*old] = new;
+    }
+    segmentation.relabel(&into.iter().map(|i| place[*i]).collect::<Vec<usize>>());
+    let pitches: Vec<f64> = kept.iter().map(|i| pitches[*i]).collect();
+    let markers: Vec<DVec2> = kept.iter().map(|i| centres[*i]).collect();
+    let by_hand = kept.iter().map(|i| survey.sites[*i].by_hand).collect();
+    let regions = walls::regions(&segmentation, &relief, &markers, &pitches);
+    let walls = walls::walls(&segmentation, &relief, &regions);
+    let centres = regions
+        .iter()
+        .zip(&markers)
+        .map(|(r, m)| if r.area > 0.0 && r.on_border == 0 { r.centroid } else { *m })
+        .collect();
+    Segmented { segmentation, relief, centres, markers, by_hand, pitches, regions, walls }
+}
+
+/// Cells that were found as two halves, having no wall between them: for each, the one that it joins.
+fn halves(
+    sites: &[Site],
+    regions: &[Region],
+    walls: &BTreeMap<(usize, usize), Wall>,
+    pitches: &[f64],
+) -> Vec<usize> {
+    let rise = |(a, b): (usize, usize), w: &Wall| w.height - regions[a].inside.max(regions[b].inside);
+    let found = |i: usize| sites[i].depth == 0 && !sites[i].by_hand;
+    let seen = |(a, b): (usize, usize)| found(a) && found(b);
+    let typical = median(walls.iter().filter(|(p, _)| seen(**p)).map(|(p, w)| rise(*p, w)));
+    let mut into: Vec<usize> = (0..sites.len()).collect();
+    for (pair, wall) in walls {
+        let (a, b) = *pair;
+        let pitch = (pitches[a] + pitches[b]) / 2.0;
+        let open = rise(*pair, wall) < HALVES_RISE * typical && wall.length > 0.3 * pitch;
+        let sized = regions[a].area + regions[b].area < HALVES_AREA * pitch * pitch * 0.75_f64.sqrt();
+        let close = regions[a].centroid.distance(regions[b].centroid) < HALVES_DISTANCE * pitch;
+        let free = into[a] == a && into[b] == b && into.iter().filter(|i| **i == a).count() == 1;
+        if seen(*pair) && open && sized && close && free {
+            into[b] = a;
+        }
+    }
+    into
+}
+
+fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
+    let Segmented { segmentation, relief, mut centres, markers, by_hand, pitches, regions, walls } =
+        segmented;
+    let rasters = Rasters { relief: &relief, wallness: &survey.wallness, segmentation: &segmentation };
+    let insides: Vec<f64> = regions.iter().map(|r| r.inside).collect();
+    let evidence = evidence::gather(&rasters, &centres, &insides, &pitches);
+    let cut: Vec<bool> = regions
+        .iter()
+        .zip(&evidence)
+        .map(|(r, e)| r.area == 0.0 || (r.on_border > 0 && e.visible < 1.0) || r.on_nothing > 0)
+        .collect();
+    let whole: Vec<bool> = cut.iter().map(|c| !c).collect();
+    let mut kinds = kinds::classify(&centres, &pitches, &evidence, &whole);
+    for (kind, by_hand) in kinds.iter_mut().zip(&by_hand) {
+        if *by_hand {
+            *kind = Kind::Seen;
+        }
+    }
+    for (index, centre) in centres.iter_mut().enumerate().filter(|(i, _)| kinds[*i] != Kind::Seen) {
+        *centre = markers[index];
+    }
+    let cells = Cells { centres: &centres, pitches: &pitches, kinds: &kinds, cut: &cut };
+    let counts = sides::count(&cells, &walls);
+    let size = DVec2::new(relief.width() as f64, relief.height() as f64);
+    Reading { scale, centres, regions, walls, evidence, kinds, cut, counts, pitches, size }
+}
