@@ -7,11 +7,15 @@
 //! |---|---|
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `enclosure` | `enclosure.rs` |
+//! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the only room that prints")]
 
+mod comb;
+mod comb_render;
+mod comb_score;
 mod enclosure;
 mod interrupt;
 mod manual;
@@ -36,6 +40,8 @@ struct Arguments {
 enum Command {
     /// Build an enclosure: two shells with a gap for bees, and a base, as parts that print
     Enclosure(Box<enclosure::EnclosureArguments>),
+    /// Read the cells of comb and their numbers of sides from photographs
+    Comb(Box<comb::CombArguments>),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -48,6 +54,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let ended = match arguments.command {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
+        Command::Comb(comb) => comb::run(&comb),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };

@@ -9,7 +9,10 @@
 //! | shaded triangles in a picture | `render.rs` |
 //! | colours that colour-blind readers tell apart | `palette.rs` |
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
+//! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
 
+pub mod comb;
+mod comb_overlay;
 pub mod enclosure;
 pub mod enclosure_drawing;
 pub mod enclosure_section;

@@ -1,0 +1,260 @@
+//! The overlay: the photograph with what was read from it.
+//!
+//! Outlines in the colour of the number of sides; cells that are not hexagons filled, with their number; 5–7 pairs joined;
+//! cut cells outlined in grey; doubtful ones hatched; hidden ones as a dot. The legend stands below.
+
+use super::{
+    comb::status_name,
+    figure::{Anchor, Drawing, FigureError},
+    palette::{Colour, GREY, INK, VERMILION, of_sides},
+};
+use crate::{
+    comb::{Comb, Photo},
+    tessellation::{Cell, CellId, CellStatus, defects},
+};
+use glam::DVec2;
+use image::{ExtendedColorType, ImageEncoder, RgbImage, codecs::png, imageops};
+use resvg::tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, PixmapMut, Stroke, Transform};
+
+/// Pixels per cell in the overlay: a larger photograph is reduced to it, so that the file stays small enough to be opened.
+const OVERLAY_PITCH: f64 = 64.0;
+/// Height of the legend.
+const LEGEND: f64 = 34.0;
+
+/// The overlay as a PNG file.
+///
+/// # Errors
+/// The legend cannot be drawn or the file not be encoded.
+pub(super) fn draw(comb: &Comb, photo: &Photo) -> Result<Vec<u8>, FigureError> {
+    let scale = (OVERLAY_PITCH / comb.pitch).min(1.0);
+    let full = photo.to_rgb8();
+    let picture = if scale < 1.0 {
+        let size = |length: usize| to_u32(length as f64 * scale).max(1);
+        imageops::thumbnail(&full, size(comb.width), size(comb.height))
+    } else {
+        full
+    };
+    let legend = legend(f64::from(picture.width()))?;
+    let (width, height) = picture.dimensions();
+    let mut sheet = with_alpha(&picture);
+    if let Some(pixmap) = PixmapMut::from_bytes(&mut sheet, width, height) {
+        Overlay { comb, scale, pixmap }.draw();
+    }
+    let mut bytes = without_alpha(&sheet);
+    bytes.extend_from_slice(legend.as_raw());
+    let mut file = Vec::new();
+    let encoder =
+        png::PngEncoder::new_with_quality(&mut file, png::CompressionType::Fast, png::FilterType::Sub);
+    encoder.write_image(&bytes, width, height + legend.height(), ExtendedColorType::Rgb8)?;
+    Ok(file)
+}
+
+struct Overlay<'a> {
+    comb: &'a Comb,
+    scale: f64,
+    pixmap: PixmapMut<'a>,
+}
+
+impl Overlay<'_> {
+    fn draw(mut self) {
+        let comb = self.comb;
+        for (id, cell) in comb.pattern.cells.enumerated() {
+            if comb.details[id].seen {
+                self.cell(id, cell);
+            } else {
+                self.dot(cell);
+            }
+        }
+        self.pairs();
+        for (_, cell) in comb.pattern.cells.enumerated() {
+            if cell.status != CellStatus::Cut
+                && let Some(sides) = cell.sides.filter(|n| *n != 6)
+            {
+                self.digit(cell.position.truncate(), sides);
+            }
+        }
+    }
+
+    fn pairs(&mut self) {
+        let comb = self.comb;
+        for pair in defects(&comb.pattern).pairs {
+            let ends = [pair.few, pair.many].map(|id| comb.pattern.cells[id].position.truncate());
+            let path = self.path(&ends, false);
+            self.stroke(path.as_ref(), Colour([255; 3]), 0.11, 1.0);
+            self.stroke(path.as_ref(), VERMILION, 0.06, 1.0);
+        }
+    }
+
+    fn cell(&mut self, id: CellId, cell: &Cell) {
+        let outline = &self.comb.details[id].outline;
+        let centre = cell.position.truncate();
+        let inner: Vec<DVec2> = outline.iter().map(|p| centre + (*p - centre) * 0.93).collect();
+        let path = self.path(&inner, true);
+        let colour = match (cell.status, cell.sides) {
+            (CellStatus::Cut, _) | (_, None) => GREY,
+            (_, Some(sides)) => of_sides(sides),
+        };
+        if cell.status == CellStatus::Complete
+            && cell.sides != Some(6)
+            && let Some(path) = &path
+        {
+            self.pixmap.fill_path(path, &paint(colour, 0.45), FillRule::EvenOdd, Transform::identity(), None);
+        }
+        if cell.status == CellStatus::Uncertain {
+            for [a, b] in hatching(&inner, 0.16 * self.comb.pitch) {
+                let line = self.path(&[a, b], false);
+                self.stroke(line.as_ref(), Colour([255; 3]), 0.03, 0.9);
+            }
+        }
+        let width = if cell.status == CellStatus::Cut { 0.025 } else { 0.05 };
+        self.stroke(path.as_ref(), colour, width, 0.95);
+    }
+
+    fn dot(&mut self, cell: &Cell) {
+        let at = cell.position.truncate();
+        let arm = DVec2::splat(0.08 * self.comb.pitch);
+        for step in [arm, DVec2::new(arm.x, -arm.y)] {
+            let path = self.path(&[at - step, at + step], false);
+            self.stroke(path.as_ref(), GREY, 0.04, 0.9);
+        }
+    }
+
+    /// A digit in seven strokes, legible at any size of cell.
+    fn digit(&mut self, centre: DVec2, digit: u32) {
+        let unit = 0.11 * self.comb.pitch;
+        let at = |(x, y): (f64, f64)| centre + DVec2::new(x, y) * unit;
+        for stroke in strokes(digit) {
+            let points: Vec<DVec2> = stroke.iter().map(|p| at(*p)).collect();
+            let path = self.path(&points, false);
+            self.stroke(path.as_ref(), INK, 0.11, 0.9);
+            self.stroke(path.as_ref(), Colour([255; 3]), 0.05, 1.0);
+        }
+    }
+
+    fn path(&self, points: &[DVec2], closed: bool) -> Option<Path> {
+        let mut builder = PathBuilder::new();
+        for (index, point) in points.iter().enumerate() {
+            let (x, y) = (single(point.x * self.scale), single(point.y * self.scale));
+            if index == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
+        }
+        if closed {
+            builder.close();
+        }
+        builder.finish()
+    }
+
+    /// Strokes a path; the width is in pitches.
+    fn stroke(&mut self, path: Option<&Path>, colour: Colour, width: f64, opacity: f64) {
+        let Some(path) = path else { return };
+        let width = single((width * self.comb.pitch * self.scale).max(1.0));
+        let stroke = Stroke { width, line_cap: LineCap::Round, ..Stroke::default() };
+        self.pixmap.stroke_path(path, &paint(colour, opacity), &stroke, Transform::identity(), None);
+    }
+}
+
+/// Lines at 45° across a polygon.
+fn hatching(polygon: &[DVec2], spacing: f64) -> Vec<[DVec2; 2]> {
+    let along = DVec2::new(1.0, -1.0).normalize();
+    let across = along.perp();
+    let offsets = || polygon.iter().map(|p| p.dot(across));
+    let (low, high) = (offsets().fold(f64::INFINITY, f64::min), offsets().fold(f64::NEG_INFINITY, f64::max));
+    let mut lines = Vec::new();
+    let mut offset = (low / spacing).ceil() * spacing;
+    while offset < high && spacing > 0.0 {
+        let mut crossings: Vec<f64> = polygon
+            .iter()
+            .zip(polygon.iter().cycle().skip(1))
+            .filter(|(a, b)| (a.dot(across) > offset) != (b.dot(across) > offset))
+            .map(|(a, b)| {
+                let t = (offset - a.dot(across)) / (b.dot(across) - a.dot(across));
+                a.lerp(*b, t).dot(along)
+            })
+            .collect();
+        crossings.sort_by(f64::total_cmp);
+        lines.extend(crossings.chunks_exact(2).map(|c| [c[0], c[1]].map(|t| along * t + across * offset)));
+        offset += spacing;
+    }
+    lines
+}
+
+/// The strokes of a digit in a box of 2 x 4 units about the origin.
+fn strokes(digit: u32) -> Vec<Vec<(f64, f64)>> {
+    let (l, r, t, m, b) = (-1.0, 1.0, -2.0, 0.0, 2.0);
+    match digit {
+        3 => vec![vec![(l, t), (r, t), (r, b), (l, b)], vec![(l, m), (r, m)]],
+        4 => vec![vec![(l, t), (l, m), (r, m)], vec![(r, t), (r, b)]],
+        5 => vec![vec![(r, t), (l, t), (l, m), (r, m), (r, b), (l, b)]],
+        7 => vec![vec![(l, t), (r, t), (0.0, b)]],
+        8 => vec![vec![(l, t), (r, t), (r, b), (l, b), (l, t)], vec![(l, m), (r, m)]],
+        9 => vec![vec![(r, m), (l, m), (l, t), (r, t), (r, b), (l, b)]],
+        _ => vec![vec![(l, m), (r, m)], vec![(0.0, -1.0), (0.0, 1.0)]],
+    }
+}
+
+fn legend(width: f64) -> Result<RgbImage, FigureError> {
+    let mut drawing = Drawing::new(width, LEGEND);
+    let mut x = 8.0;
+    let size = if width < 900.0 { 10.0 } else { 13.0 };
+    let mut entry = |swatch: &dyn Fn(&mut Drawing, f64), text: &str| {
+        swatch(&mut drawing, x);
+        drawing.text([x + 22.0, 22.0], size, Anchor::Start, INK, text);
+        x += 30.0 + size * 0.56 * text.len() as f64;
+    };
+    for (sides, text) in [(4, "4"), (5, "5"), (6, "6"), (7, "7"), (8, "8 sides")] {
+        entry(&|d, x| box_of(d, x, of_sides(sides)), text);
+    }
+    entry(&|d, x| box_of(d, x, GREY), status_name(CellStatus::Cut));
+    entry(
+        &|d, x| {
+            box_of(d, x, INK);
+            for k in 0..3 {
+                let k = f64::from(k) * 5.0;
+                d.line(&[[x + 1.0 + k, 24.0], [x + 6.0 + k, 11.0]], INK, 1.2);
+            }
+        },
+        "uncertain",
+    );
+    entry(
+        &|d, x| {
+            d.line(&[[x + 4.0, 13.0], [x + 12.0, 21.0]], GREY, 2.0);
+            d.line(&[[x + 4.0, 21.0], [x + 12.0, 13.0]], GREY, 2.0);
+        },
+        "hidden, inferred",
+    );
+    entry(&|d, x| d.line(&[[x, 17.0], [x + 16.0, 17.0]], VERMILION, 3.0), "5-7 pair");
+    drawing.finish().raster(1.0)
+}
+
+fn box_of(drawing: &mut Drawing, x: f64, colour: Colour) {
+    drawing.line(&[[x, 10.0], [x + 16.0, 10.0], [x + 16.0, 25.0], [x, 25.0], [x, 10.0]], INK, 3.6);
+    drawing.line(&[[x, 10.0], [x + 16.0, 10.0], [x + 16.0, 25.0], [x, 25.0], [x, 10.0]], colour, 2.4);
+}
+
+fn paint(colour: Colour, opacity: f64) -> Paint<'static> {
+    let [r, g, b] = colour.0;
+    let mut paint = Paint { anti_alias: true, ..Paint::default() };
+    paint.set_color_rgba8(r, g, b, u8::try_from(to_u32(opacity * 255.0)).unwrap_or(u8::MAX));
+    paint
+}
+
+fn with_alpha(picture: &RgbImage) -> Vec<u8> {
+    picture.as_raw().chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], u8::MAX]).collect()
+}
+
+fn without_alpha(sheet: &[u8]) -> Vec<u8> {
+    sheet.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "drawing coordinates need no more than single precision")]
+const fn single(value: f64) -> f32 {
+    value as f32
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "rounded and clamped before the cast"
+)]
+fn to_u32(value: f64) -> u32 {
+    value.round().clamp(0.0, f64::from(u32::MAX)) as u32
+}
