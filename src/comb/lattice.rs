@@ -204,11 +204,12 @@ impl<'a> Growth<'a> {
         let points: Vec<DVec2> = self.sites.iter().map(|s| s.position).collect();
         let delaunay = Delaunay::of(&points);
         let mut found = Vec::new();
-        for ((a, b), thirds) in &delaunay.edges {
-            let good: Vec<usize> = thirds.iter().copied().filter(|c| self.is_good(*a, *b, *c)).collect();
-            if let [third] = good[..] {
-                let position = points[*a] + points[*b] - points[third];
-                let depth = self.sites[*a].depth.max(self.sites[*b].depth);
+        for edge in &delaunay.edges {
+            let (a, b) = edge.ends;
+            let mut good = edge.across().filter(|c| self.is_good(a, b, *c));
+            if let (Some(third), None) = (good.next(), good.next()) {
+                let position = points[a] + points[b] - points[third];
+                let depth = self.sites[a].depth.max(self.sites[b].depth);
                 if self.is_free(position) {
                     found.push(Prediction { position, depth });
                 }

@@ -190,8 +190,8 @@ fn learned_colour(colours: &Colours, survey: &Survey, pitch: f64) -> Option<Wall
     };
     let walls: Vec<DVec2> = Delaunay::of(&seen)
         .edges
-        .keys()
-        .map(|(a, b)| (seen[*a], seen[*b]))
+        .iter()
+        .map(|edge| (seen[edge.ends.0], seen[edge.ends.1]))
         .filter(|(a, b)| a.distance(*b) < 1.3 * pitch)
         .filter_map(|(a, b)| crest(a, b))
         .collect();
@@ -238,7 +238,8 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     segmentation.relabel(&into.iter().map(|i| place[*i]).collect::<Vec<usize>>());
     let pitches: Vec<f64> = kept.iter().map(|i| pitches[*i]).collect();
     let markers: Vec<DVec2> = kept.iter().map(|i| centres[*i]).collect();
-    let by_hand = kept.iter().map(|i| survey.sites[*i].by_hand).collect();
+    let by_hand =
+        kept.iter().map(|i| survey.sites[*i].by_hand || joined.iter().any(|(a, _)| a == i)).collect();
     let regions = walls::regions(&segmentation, &relief, &markers, &pitches);
     let walls = walls::walls(&segmentation, &relief, &regions);
     let centres = regions

@@ -5,7 +5,11 @@
 //! Voronoi edge and the wall, both counted as negative if they run the other way (if it is the other two cells that touch).
 //! Their weighted mean decides, and its size says how sure that is.
 
-use super::{kinds::Kind, triangulation::Delaunay, walls::Wall};
+use super::{
+    kinds::Kind,
+    triangulation::{Delaunay, voronoi_length},
+    walls::Wall,
+};
 use glam::DVec2;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -68,18 +72,19 @@ pub(crate) fn count(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>) -
 fn quads(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>, delaunay: &Delaunay) -> Vec<Quad> {
     let wall = |a: usize, b: usize| walls.get(&(a.min(b), a.max(b))).map_or(0.0, |w| w.length);
     let mut quads = Vec::new();
-    for ((a, b), thirds) in &delaunay.edges {
-        let &[c, d] = thirds.as_slice() else { continue };
-        let Some(voronoi) = delaunay.voronoi_length(cells.centres, *a, *b) else { continue };
-        let four = [*a, *b, c, d];
+    for edge in &delaunay.edges {
+        let [Some(c), Some(d)] = edge.thirds else { continue };
+        let Some(voronoi) = voronoi_length(cells.centres, edge) else { continue };
+        let (a, b) = edge.ends;
+        let four = [a, b, c, d];
         let pitch = four.iter().map(|i| cells.pitches[*i]).sum::<f64>() / 4.0;
         let all_seen = four.iter().all(|i| cells.kinds[*i] == Kind::Seen);
         let any_cut = four.iter().any(|i| cells.cut[*i]);
         let wall_weight = if all_seen { 1.0 } else { HIDDEN_WALL_WEIGHT };
         let centre_weight = if any_cut && all_seen { BORDER_CENTRE_WEIGHT } else { 1.0 };
-        let sum = wall_weight * (wall(*a, *b) - wall(c, d)) + centre_weight * voronoi;
+        let sum = wall_weight * (wall(a, b) - wall(c, d)) + centre_weight * voronoi;
         quads.push(Quad {
-            edge: (*a, *b),
+            edge: (a, b),
             across: (c.min(d), c.max(d)),
             length: sum / (wall_weight + centre_weight) / pitch,
         });
@@ -89,7 +94,7 @@ fn quads(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>, delaunay: &D
 
 /// The edges of the triangulation, those of negative length exchanged for the ones across.
 fn decided(delaunay: &Delaunay, quads: &[Quad]) -> BTreeSet<(usize, usize)> {
-    let mut edges: BTreeSet<(usize, usize)> = delaunay.edges.keys().copied().collect();
+    let mut edges: BTreeSet<(usize, usize)> = delaunay.edges.iter().map(|edge| edge.ends).collect();
     let mut exchanged: BTreeSet<(usize, usize)> = BTreeSet::new();
     let mut order: Vec<&Quad> = quads.iter().filter(|q| q.length < 0.0).collect();
     order.sort_by(|p, q| p.length.total_cmp(&q.length));

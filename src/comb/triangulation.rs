@@ -2,7 +2,6 @@
 
 use glam::DVec2;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
-use std::collections::BTreeMap;
 
 /// A centre in the triangulation, with its place in the list that it came from.
 #[derive(Clone, Copy)]
@@ -19,13 +18,29 @@ impl HasPosition for Centre {
     }
 }
 
+/// An edge between two neighbouring centres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edge {
+    /// Its ends, lower index first.
+    pub(crate) ends: (usize, usize),
+    /// The third corners of the triangles on both sides; one is missing at the hull.
+    pub(crate) thirds: [Option<usize>; 2],
+}
+
+impl Edge {
+    /// The third corners that exist.
+    pub(crate) fn across(&self) -> impl Iterator<Item = usize> + use<> {
+        self.thirds.into_iter().flatten()
+    }
+}
+
 /// Triangles between points, and who is opposite whom across each edge.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Delaunay {
-    /// Counter-clockwise (in a frame with y up) triples of indices.
+    /// Triples of indices.
     pub(crate) triangles: Vec<[usize; 3]>,
-    /// For every edge (lower index first), the third corner of each triangle on it.
-    pub(crate) edges: BTreeMap<(usize, usize), Vec<usize>>,
+    /// All edges, in ascending order of their ends.
+    pub(crate) edges: Vec<Edge>,
 }
 
 impl Delaunay {
@@ -44,34 +59,40 @@ impl Delaunay {
             .inner_faces()
             .map(|face| face.vertices().map(|vertex| vertex.data().index))
             .collect();
-        let mut edges: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
-        for [a, b, c] in &triangles {
-            for (p, q, third) in [(a, b, c), (b, c, a), (c, a, b)] {
-                edges.entry((*p.min(q), *p.max(q))).or_default().push(*third);
-            }
-        }
+        let mut edges: Vec<Edge> = triangulation
+            .undirected_edges()
+            .map(|edge| {
+                let [a, b] = edge.vertices().map(|vertex| vertex.data().index);
+                let third = |side: spade::handles::DirectedEdgeHandle<'_, Centre, (), (), ()>| {
+                    side.opposite_vertex().map(|vertex| vertex.data().index)
+                };
+                let side = edge.as_directed();
+                Edge { ends: (a.min(b), a.max(b)), thirds: [third(side), third(side.rev())] }
+            })
+            .collect();
+        edges.sort_unstable_by_key(|edge| edge.ends);
         Self { triangles, edges }
     }
 
     /// Neighbours of every point, in ascending order.
     pub(crate) fn neighbours(&self, count: usize) -> Vec<Vec<usize>> {
         let mut neighbours = vec![Vec::new(); count];
-        for (a, b) in self.edges.keys() {
+        for Edge { ends: (a, b), .. } in &self.edges {
             neighbours[*a].push(*b);
             neighbours[*b].push(*a);
         }
         neighbours.iter_mut().for_each(|list| list.sort_unstable());
         neighbours
     }
+}
 
-    /// Length of the Voronoi edge between two neighbours: the distance of the circumcentres on both sides; `None` at the
-    /// hull.
-    pub(crate) fn voronoi_length(&self, points: &[DVec2], a: usize, b: usize) -> Option<f64> {
-        let &[c, d] = self.edges.get(&(a.min(b), a.max(b)))?.as_slice() else { return None };
-        let one = circumcentre(points[a], points[b], points[c])?;
-        let two = circumcentre(points[a], points[b], points[d])?;
-        Some(one.distance(two))
-    }
+/// Length of the Voronoi edge across an edge: the distance of the circumcentres on both sides; `None` at the hull.
+pub(crate) fn voronoi_length(points: &[DVec2], edge: &Edge) -> Option<f64> {
+    let [Some(c), Some(d)] = edge.thirds else { return None };
+    let (a, b) = (points[edge.ends.0], points[edge.ends.1]);
+    let one = circumcentre(a, b, points[c])?;
+    let two = circumcentre(a, b, points[d])?;
+    Some(one.distance(two))
 }
 
 /// Centre of the circle through three points; `None` where they are in line.

@@ -3,7 +3,7 @@
 use crate::{
     comb::{
         kinds::median,
-        triangulation::{Delaunay, circumcentre},
+        triangulation::{Delaunay, circumcentre, voronoi_length},
     },
     tessellation::CellPattern,
 };
@@ -13,6 +13,12 @@ use rand_chacha::ChaCha8Rng;
 
 /// Margin of a random comb around the picture, in pitches.
 const MARGIN: f64 = 4.0;
+/// Cells per grain at disorder 1; at 0.5 about a tenth of the cells then lie on grain boundaries and are no hexagons.
+const CELLS_PER_GRAIN: f64 = 55.0;
+/// Greatest step of a cell from its place in the lattice at disorder 1, in pitches.
+const JITTER: f64 = 0.2;
+/// Steps towards the centre of the Voronoi polygon: bees build walls of nearly equal length.
+const LLOYD_STEPS: usize = 10;
 /// Cells of a pattern whose normal is turned further than this from the mean are left out (cosine).
 const FACING: f64 = 0.5;
 
@@ -53,28 +59,30 @@ impl Arrangement {
     pub fn random(width: f64, height: f64, disorder: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let half = DVec2::new(width, height) / 2.0 + DVec2::splat(MARGIN);
-        let grains = if disorder > 0.0 { 3 } else { 1 };
+        let grains = 1 + crate::comb::plane::pixels(4.0 * half.x * half.y * disorder / CELLS_PER_GRAIN);
         let seeds: Vec<(DVec2, f64)> = (0..grains)
             .map(|_| {
                 let at = half * DVec2::new(random.random_range(-1.0..1.0), random.random_range(-1.0..1.0));
                 (at, random.random_range(0.0..std::f64::consts::FRAC_PI_3))
             })
             .collect();
+        let nearest_grain = |point: DVec2| {
+            (0..grains).min_by(|a, b| {
+                seeds[*a].0.distance_squared(point).total_cmp(&seeds[*b].0.distance_squared(point))
+            })
+        };
         let mut centres = Vec::new();
         for (grain, (_, turn)) in seeds.iter().enumerate() {
             for point in hexagonal(half, *turn) {
-                let own = (0..grains).min_by(|a, b| {
-                    seeds[*a].0.distance_squared(point).total_cmp(&seeds[*b].0.distance_squared(point))
-                });
-                if own == Some(grain) {
+                if nearest_grain(point) == Some(grain) {
                     let step = DVec2::new(random.random_range(-1.0..1.0), random.random_range(-1.0..1.0));
-                    centres.push(point + step * (0.02 + 0.75 * disorder));
+                    centres.push(point + step * (0.02 + JITTER * disorder));
                 }
             }
         }
         let mut arrangement = Self { centres };
         arrangement.thin(0.55);
-        for _ in 0..6 {
+        for _ in 0..LLOYD_STEPS {
             arrangement.even_out();
         }
         arrangement
@@ -143,11 +151,9 @@ impl Arrangement {
             }
         }
         let mut rim = vec![false; self.centres.len()];
-        for ((a, b), thirds) in &delaunay.edges {
-            if thirds.len() < 2 {
-                rim[*a] = true;
-                rim[*b] = true;
-            }
+        for edge in delaunay.edges.iter().filter(|edge| edge.across().count() < 2) {
+            rim[edge.ends.0] = true;
+            rim[edge.ends.1] = true;
         }
         let near_misses = self.near_misses(&delaunay);
         (0..self.centres.len())
@@ -179,10 +185,10 @@ impl Arrangement {
     /// more.
     fn near_misses(&self, delaunay: &Delaunay) -> Vec<f64> {
         let mut least = vec![f64::INFINITY; self.centres.len()];
-        for ((a, b), thirds) in &delaunay.edges {
-            if let Some(length) = delaunay.voronoi_length(&self.centres, *a, *b) {
-                for third in thirds {
-                    least[*third] = least[*third].min(length);
+        for edge in &delaunay.edges {
+            if let Some(length) = voronoi_length(&self.centres, edge) {
+                for third in edge.across() {
+                    least[third] = least[third].min(length);
                 }
             }
         }

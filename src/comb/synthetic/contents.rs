@@ -6,8 +6,9 @@ use glam::DVec2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A wall shorter than this, in pitches, is thinner than the wax is thick: both readings are right.
-const AMBIGUOUS: f64 = 0.07;
+/// A wall shorter than this, in pitches, is no longer than the wax is thick, so that four cells seem to meet: both readings
+/// are right.
+const AMBIGUOUS: f64 = 0.1;
 /// Half axes of a bee, in pitches.
 const BEE: DVec2 = DVec2::new(1.5, 0.62);
 
