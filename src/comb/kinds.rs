@@ -11,6 +11,8 @@ use glam::DVec2;
 const CLOSURE: f64 = 0.65;
 /// Least share of the middle that must be lower than the wall. Caps and pollen of a wall's colour are below it.
 const OPENNESS: f64 = 0.7;
+/// The same for a cell that the border of the photograph cuts, between two cells that are seen.
+const PARTIAL_OPENNESS: f64 = 0.5;
 /// Least mean rise of the levelled relief; noise that was levelled up rises by about 0.5.
 const RISE: f64 = 0.6;
 /// Least contrast before levelling, as a share of the photograph's median. Sky and blurred ground are below it; comb in
@@ -36,21 +38,27 @@ pub(crate) enum Kind {
     Outside,
 }
 
-/// Decides what each place is.
+/// Decides what each place is; `whole` are the cells that neither the border nor a mask cuts.
 pub(crate) fn classify(
     centres: &[DVec2],
     pitches: &[f64],
     evidence: &[Evidence],
-    measurable: &[bool],
+    whole: &[bool],
 ) -> Vec<Kind> {
-    let typical = median(evidence.iter().zip(measurable).filter(|(_, m)| **m).map(|(e, _)| e.contrast));
+    let typical = median(evidence.iter().zip(whole).filter(|(_, w)| **w).map(|(e, _)| e.contrast));
     let open: Vec<bool> = evidence.iter().map(|e| is_open(e, typical)).collect();
     let anchored = pieces(centres, pitches, &open);
+    let grid = Grid::of(centres, median(pitches.iter().copied()).max(1.0));
+    let partial = |i: usize| {
+        let neighbours = grid.within(centres[i], 1.4 * pitches[i]).filter(|(n, _)| anchored[*n]).count();
+        !whole[i] && evidence[i].openness >= PARTIAL_OPENNESS && neighbours >= 2
+    };
     let inside = between(centres, pitches, &anchored);
     (0..centres.len())
         .map(|i| match (anchored[i], inside[i]) {
             (true, _) => Kind::Seen,
             (false, true) if open[i] => Kind::Seen,
+            (false, false) if partial(i) => Kind::Seen,
             (false, true) => Kind::Hidden,
             (false, false) => Kind::Outside,
         })
