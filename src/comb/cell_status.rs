@@ -48,8 +48,9 @@ fn standing(reading: &Reading, cell: usize, typical_rise: f64) -> Standing {
     let evidence = &reading.evidence[cell];
     let doubt = HIDDEN_SIDE.powi(saturating(hidden)) * SIDE_BEYOND.powi(saturating(beyond.len()));
     let confidence = (reading.counts[cell].confidence * doubt * evidence.closure).min(GREATEST_CONFIDENCE);
-    // The place of a neighbour that is not seen was inferred as if there were no defect: it cannot prove one.
-    let (odd, unseen) = (neighbours.len() != 6, hidden + beyond.len());
+    // The place of a neighbour of which little is seen was inferred as if there were no defect: it cannot prove one.
+    let slivers = of_kind(Kind::Seen).filter(|n| reading.slivers[**n]).count();
+    let (odd, unseen) = (neighbours.len() != 6, hidden + beyond.len() + slivers);
     let status = if reading.kinds[cell] != Kind::Seen {
         CellStatus::Uncertain
     } else if reading.cut[cell] || !at_edge.is_empty() || hidden > HIDDEN_NEIGHBOURS {

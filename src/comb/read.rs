@@ -44,6 +44,8 @@ const HALVES_RISE: f64 = 0.55;
 const HALVES_AREA: f64 = 1.65;
 const HALVES_DISTANCE: f64 = 0.78;
 
+/// A cell that the border cuts is a sliver if less than this share of its outline is seen.
+const HALF_SEEN: f64 = 0.5;
 /// Seen cells below which there is no comb.
 pub(crate) const LEAST_CELLS: usize = 7;
 
@@ -63,6 +65,8 @@ pub(crate) struct Reading {
     pub(crate) kinds: Vec<Kind>,
     /// Whether the border, a mask or nothing cuts the cell.
     pub(crate) cut: Vec<bool>,
+    /// Whether so little of the cell is seen that its centre is a guess.
+    pub(crate) slivers: Vec<bool>,
     /// Neighbours and doubts.
     pub(crate) counts: Vec<Count>,
     /// Local pitch.
@@ -297,8 +301,9 @@ fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
     for (index, centre) in centres.iter_mut().enumerate().filter(|(i, _)| kinds[*i] != Kind::Seen) {
         *centre = markers[index];
     }
-    let cells = Cells { centres: &centres, pitches: &pitches, kinds: &kinds, cut: &cut };
+    let slivers: Vec<bool> = evidence.iter().map(|e| e.visible < HALF_SEEN).collect();
+    let cells = Cells { centres: &centres, pitches: &pitches, kinds: &kinds, cut: &cut, slivers: &slivers };
     let counts = sides::count(&cells, &walls);
     let size = DVec2::new(relief.width() as f64, relief.height() as f64);
-    Reading { scale, centres, regions, walls, evidence, kinds, cut, counts, pitches, size }
+    Reading { scale, centres, regions, walls, evidence, kinds, cut, slivers, counts, pitches, size }
 }

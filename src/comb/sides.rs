@@ -33,6 +33,8 @@ pub(crate) struct Cells<'a> {
     pub(crate) kinds: &'a [Kind],
     /// Whether the border, a mask or nothing cuts the cell.
     pub(crate) cut: &'a [bool],
+    /// Whether so little of the cell is seen that its walls do not tell.
+    pub(crate) slivers: &'a [bool],
 }
 
 /// The count of one cell.
@@ -78,7 +80,7 @@ fn quads(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>, delaunay: &D
         let (a, b) = edge.ends;
         let four = [a, b, c, d];
         let pitch = four.iter().map(|i| cells.pitches[*i]).sum::<f64>() / 4.0;
-        let all_seen = four.iter().all(|i| cells.kinds[*i] == Kind::Seen);
+        let all_seen = four.iter().all(|i| cells.kinds[*i] == Kind::Seen && !cells.slivers[*i]);
         let any_cut = four.iter().any(|i| cells.cut[*i]);
         let wall_weight = if all_seen { 1.0 } else { HIDDEN_WALL_WEIGHT };
         let centre_weight = if any_cut && all_seen { BORDER_CENTRE_WEIGHT } else { 1.0 };
