@@ -16,6 +16,7 @@
 //! The library prints nothing. The program `combwright` is built with the feature `cli`.
 
 pub mod enclosure;
+pub mod foam;
 pub mod index;
 pub mod mesh;
 pub mod report;

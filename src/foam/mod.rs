@@ -1,0 +1,2 @@
+//! The ideal foam between two walls.
+pub mod network;
