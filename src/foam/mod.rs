@@ -1,2 +1,6 @@
 //! The ideal foam between two walls.
+pub mod complex;
+pub mod energy;
 pub mod network;
+pub mod solve;
+pub mod volume;
