@@ -66,7 +66,7 @@ impl Axis {
 }
 
 /// One image of the primary box: a reflection at the low ends of some axes, then `shift` translations along each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct Image {
     /// The translations, in units of [`Axis::repeat`].
     pub shift: [i32; 3],

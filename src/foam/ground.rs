@@ -2,7 +2,7 @@
 
 use crate::{
     foam::domain::{Axis, Domain},
-    surface::{Gap, GapKind, LevelSet, SurfaceSamples},
+    surface::{Gap, GapKind, LevelSet, SurfacePoint, SurfaceSamples},
 };
 use glam::DVec3;
 use rand::{Rng, RngExt};
@@ -65,17 +65,17 @@ impl Ground {
     }
 
     fn measure(&mut self) {
-        let samples = SurfaceSamples::new(self.surface.as_ref(), 0.0, MEASURE_LINES);
-        let (mut area, mut weight, mut slope) = (0.0, 0.0, 0.0);
-        for point in samples.points() {
-            let share = point.weight * self.copies_inside(point.position);
-            area += share;
-            weight += share * self.weight(point.position);
-            slope += share * self.surface.gradient(point.position).length_squared();
-        }
-        self.area = area;
-        self.mean_weight = weight / area;
-        self.mean_square_slope = slope / area;
+        self.area = self.integral(0.0, |_| 1.0);
+        self.mean_weight = self.integral(0.0, |point| self.weight(point)) / self.area;
+        self.mean_square_slope =
+            self.integral(0.0, |point| self.surface.gradient(point).length_squared()) / self.area;
+    }
+
+    /// ∫ f dA over the part of `Φ = level` that lies inside the domain.
+    fn integral(&self, level: f64, f: impl Fn(DVec3) -> f64) -> f64 {
+        let samples = SurfaceSamples::new(self.surface.as_ref(), level, MEASURE_LINES);
+        let inside = |point: &SurfacePoint| point.weight * self.copies_inside(point.position);
+        samples.points().iter().map(|point| inside(point) * f(point.position)).sum()
     }
 
     /// How many images of `point` under the surface's own periods lie in the primary box.
@@ -163,4 +163,27 @@ impl Ground {
         }
         None
     }
+}
+
+/// The volume of a gap inside a domain, by quadrature: good to about 1e-4, and to 1e-3 where plane walls cut it.
+///
+/// Walls at distances a and b from a surface with mean curvature H and Gaussian curvature K enclose
+/// ∫ (b − a) + H (b² − a²) + K (b³ − a³)/3 dA (Steiner's formula); level-set walls ∫∫ dA/|∇Φ| dΦ (the coarea formula).
+#[must_use]
+pub fn gap_volume(gap: &Gap, domain: &Domain) -> f64 {
+    let ground = Ground::new(gap, domain, Density::Uniform);
+    let [lower, upper] = gap.walls();
+    let (a, b) = (lower.level, upper.level);
+    if lower.field.is_distance() {
+        let surface = gap.middle();
+        return ground.integral(0.0, |point| {
+            let curvature = surface.curvature(point);
+            (b - a) + curvature.mean * (b * b - a * a) + curvature.gauss * (b.powi(3) - a.powi(3)) / 3.0
+        });
+    }
+    let density = |level: f64| ground.integral(level, |point| 1.0 / lower.field.gradient(point).length());
+    // Gauss's rule with three points, exact to the fifth power of the level.
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let outer = half * 0.6_f64.sqrt();
+    half / 9.0 * (5.0 * (density(middle - outer) + density(middle + outer)) + 8.0 * density(middle))
 }

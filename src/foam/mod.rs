@@ -6,8 +6,13 @@ pub mod solve;
 pub mod volume;
 
 pub mod domain;
+pub mod partition;
 pub mod seeds;
+pub mod setup;
 pub mod spatial;
+pub mod start;
 
 mod convert;
 mod ground;
+
+pub use ground::gap_volume;

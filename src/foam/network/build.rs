@@ -144,7 +144,10 @@ fn assemble(
     }
     let cells = cells
         .enumerated()
-        .map(|(id, ring)| Cell { centre: ring.centre, side: sides[id.index()].first().copied().unwrap_or(first) })
+        .map(|(id, ring)| Cell {
+            centre: ring.centre,
+            side: sides[id.index()].first().copied().unwrap_or(first),
+        })
         .collect();
     Network { period, euler_characteristic, vertices: places, cells, half_edges }
 }

@@ -17,7 +17,10 @@ pub(crate) fn hexagons(nx: usize, ny: usize) -> Network {
         let lift = j.div_euclid(ny);
         let column = i;
         let wrapped = (column.rem_euclid(nx), j.rem_euclid(ny));
-        (CellId::from_index((wrapped.1 * nx + wrapped.0) as usize), IVec3::new(column.div_euclid(nx), lift, 0))
+        (
+            CellId::from_index((wrapped.1 * nx + wrapped.0) as usize),
+            IVec3::new(column.div_euclid(nx), lift, 0),
+        )
     };
     let centre = |i: i32, j: i32| {
         let lean = if j.rem_euclid(2) == 1 { 0.5 } else { 0.0 };

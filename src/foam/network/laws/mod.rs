@@ -13,7 +13,9 @@ use glam::IVec3;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NetworkDefect {
     /// A cell with fewer than two corners (fewer than three, unless two vertices make up the whole foam).
-    #[error("cell {cell:?} has {corners} corners; at least {least} are needed (too few cells for the surface, or a cell in several pieces)")]
+    #[error(
+        "cell {cell:?} has {corners} corners; at least {least} are needed (too few cells for the surface, or a cell in several pieces)"
+    )]
     FewCorners {
         /// The cell.
         cell: CellId,
@@ -63,7 +65,9 @@ pub enum NetworkDefect {
         to: VertexId,
     },
     /// A side that the neighbour does not have.
-    #[error("cell {cell:?} has a side from {from:?} to {to:?} with {neighbour:?} behind it, but {neighbour:?} has no such side")]
+    #[error(
+        "cell {cell:?} has a side from {from:?} to {to:?} with {neighbour:?} behind it, but {neighbour:?} has no such side"
+    )]
     Unpaired {
         /// The cell.
         cell: CellId,
@@ -91,7 +95,9 @@ pub enum NetworkDefect {
         valence: usize,
     },
     /// Numbers that contradict the Euler characteristic: the cells are no decomposition of the surface.
-    #[error("{cells} cells, {edges} edges and {vertices} vertices do not fit a surface with Euler characteristic {expected}: {cells} − {edges} + {vertices} = {found}")]
+    #[error(
+        "{cells} cells, {edges} edges and {vertices} vertices do not fit a surface with Euler characteristic {expected}: {cells} − {edges} + {vertices} = {found}"
+    )]
     Euler {
         /// F.
         cells: usize,

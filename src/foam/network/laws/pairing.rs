@@ -36,12 +36,18 @@ pub(in crate::foam::network) fn check(network: &Network) -> Vec<NetworkDefect> {
     }
     for (id, cell) in network.cells.enumerated() {
         if !exists(cell.side) || network.half_edges[cell.side].cell != id {
-            found.push(NetworkDefect::Links { side: cell.side, what: "a cell claims it, but it has another cell" });
+            found.push(NetworkDefect::Links {
+                side: cell.side,
+                what: "a cell claims it, but it has another cell",
+            });
         }
     }
     for (id, vertex) in network.vertices.enumerated() {
         if !exists(vertex.out) || network.half_edges[vertex.out].origin != id {
-            found.push(NetworkDefect::Links { side: vertex.out, what: "a vertex claims it, but it starts elsewhere" });
+            found.push(NetworkDefect::Links {
+                side: vertex.out,
+                what: "a vertex claims it, but it starts elsewhere",
+            });
         }
     }
     found
