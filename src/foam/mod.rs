@@ -7,6 +7,7 @@ pub mod volume;
 
 pub mod domain;
 pub mod partition;
+pub mod pattern;
 pub mod seeds;
 pub mod setup;
 pub mod spatial;

@@ -9,11 +9,16 @@
 //! | shaded triangles in a picture | `render.rs` |
 //! | colours that colour-blind readers tell apart | `palette.rs` |
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
+//! | the foam's picture, charts, tables and meshes | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
+//! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs` |
 
 pub mod enclosure;
 pub mod enclosure_drawing;
 pub mod enclosure_section;
 pub mod figure;
+pub mod foam_chart;
+pub mod foam_files;
+pub mod foam_picture;
 pub mod folder;
 pub mod palette;
 pub mod render;

@@ -34,7 +34,11 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    fn reversed(&self) -> Self {
+    pub(super) fn length(&self) -> f64 {
+        self.points.windows(2).map(|ends| ends[0].distance(ends[1])).sum()
+    }
+
+    pub(super) fn reversed(&self) -> Self {
         let points = self.points.iter().rev().copied().collect();
         Self { from: self.to, to: self.from, points, ..*self }
     }

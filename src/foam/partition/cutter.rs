@@ -183,26 +183,29 @@ impl<'a> Cutter<'a> {
                 .iter()
                 .map(move |patch| CellFace { beyond: Beyond::Wall(side), outline: outline(patch) })
         });
-        let section = |pieces: &clip::Loop| -> Vec<Side> {
+        let sides = |pieces: &[clip::Piece]| -> Vec<Side> {
             let previous = pieces.iter().cycle().skip(pieces.len() - 1);
-            pieces
-                .iter()
-                .zip(previous)
-                .map(|(piece, previous)| Side {
-                    start: cell.nodes[piece.from].point,
-                    before: beyond(previous.face),
-                    beyond: beyond(piece.face),
-                })
-                .collect()
+            let side = |(piece, previous): (&clip::Piece, &clip::Piece)| Side {
+                start: cell.nodes[piece.from].point,
+                length: piece.length(),
+                before: beyond(previous.face),
+                beyond: beyond(piece.face),
+            };
+            pieces.iter().zip(previous).map(side).collect()
         };
-        let on_wall = |side: WallSide| -> Vec<Beyond> {
-            cell.patches[side as usize].iter().flatten().map(|piece| beyond(piece.face)).collect()
+        let on_wall = |wall: WallSide| -> Vec<Side> {
+            let edge = cell.patches[wall as usize].first();
+            // Seen from outside the cell, the lower wall's patch runs clockwise for the upper wall.
+            edge.map_or_else(Vec::new, |edge| match wall {
+                WallSide::Upper => sides(edge),
+                WallSide::Lower => sides(&edge.iter().rev().map(clip::Piece::reversed).collect::<Vec<_>>()),
+            })
         };
         PartitionCell {
             seed: self.seeds[index],
             volume: measure::volume(cell, body, self.seeds[index], &self.levels),
             faces: films.chain(patches).collect(),
-            sections: cell.section.iter().map(section).collect(),
+            sections: cell.section.iter().map(|pieces| sides(pieces)).collect(),
             on_walls: WallSide::BOTH.map(on_wall),
             pieces: cell.pieces(),
         }

@@ -68,11 +68,13 @@ pub enum Beyond {
     Wall(WallSide),
 }
 
-/// A side of a cell's section by the middle surface.
-#[derive(Clone, Debug, PartialEq)]
+/// A side of a cell's section by the middle surface, or of its patch on a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side {
     /// Where it starts.
     pub start: DVec3,
+    /// How long it is.
+    pub length: f64,
     /// What lies behind the side that ended there.
     pub before: Beyond,
     /// What lies behind it.
@@ -99,8 +101,8 @@ pub struct PartitionCell {
     pub faces: Vec<CellFace>,
     /// The loops in which it meets the middle surface, counter-clockwise as seen from the upper wall.
     pub sections: Vec<Vec<Side>>,
-    /// What it touches along its patch on the lower and the upper wall, in order.
-    pub on_walls: [Vec<Beyond>; 2],
+    /// The edge of its patch on the lower and on the upper wall, counter-clockwise as seen from the upper wall.
+    pub on_walls: [Vec<Side>; 2],
     /// The number of connected pieces.
     pub pieces: usize,
 }
@@ -109,7 +111,8 @@ impl PartitionCell {
     /// Whether it has other neighbours on one wall than on the other.
     #[must_use]
     pub fn is_twisted(&self) -> bool {
-        let [lower, upper] = self.on_walls.clone().map(|mut beyond| {
+        let [lower, upper] = [0, 1].map(|wall: usize| {
+            let mut beyond: Vec<Beyond> = self.on_walls[wall].iter().map(|side| side.beyond).collect();
             beyond.sort_unstable();
             beyond
         });
