@@ -18,4 +18,32 @@ pub(super) fn remove_on_interrupt(staging: &Path) {
     if let Err(error) = set {
         eprintln!("note: Ctrl-C will leave temporary files: {error}");
     }
+//! Ctrl-C: asked for once, obeyed at the next safe place.
+
+use std::{
+    ops::ControlFlow,
+    sync::{
+        Once,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+static ASKED: AtomicBool = AtomicBool::new(false);
+static LISTENING: Once = Once::new();
+
+/// Listens for Ctrl-C from now on. A second one ends the program at once.
+pub(super) fn listen() {
+    LISTENING.call_once(|| {
+        // Where no handler can be installed, Ctrl-C ends the program as usual.
+        let _ = ctrlc::set_handler(|| {
+            if ASKED.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+        });
+    });
+}
+
+/// Whether to go on.
+pub(super) fn flow() -> ControlFlow<()> {
+    if ASKED.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }

@@ -7,12 +7,18 @@
 //! |---|---|
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `enclosure` | `enclosure.rs` |
+//! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_batch.rs` |
+//! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the only room that prints")]
 
 mod enclosure;
+mod foam;
+mod foam_batch;
+mod foam_run;
+mod foam_settings;
 mod interrupt;
 mod manual;
 mod outcome;
@@ -36,6 +42,7 @@ struct Arguments {
 enum Command {
     /// Build an enclosure: two shells with a gap for bees, and a base, as parts that print
     Enclosure(Box<enclosure::EnclosureArguments>),
+    Foam(Box<foam::FoamArguments>),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -48,6 +55,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let ended = match arguments.command {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
+        Command::Foam(foam) => foam::foam(&foam),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };

@@ -181,8 +181,7 @@ mod tests {
         flat.into_iter().map(|p| p + DVec3::new(noise(), noise(), noise())).collect()
     }
 
-    const LOADS: FilmLoads =
-        FilmLoads { tension: 1.3, difference: 0.7, moment: DVec3::new(0.1, -0.4, 0.25) };
+    const LOADS: FilmLoads = FilmLoads { tension: 1.3, difference: 0.7, moment: DVec3::new(0.1, -0.4, 0.25) };
 
     fn lagrangian(shape: Shape, nodes: &[DVec3]) -> f64 {
         shape
@@ -221,7 +220,10 @@ mod tests {
                 assert!((gradient[column / 3][column % 3] - slope).abs() < 1e-9, "{shape:?} {column}");
                 for row in 0..3 * count {
                     let second = (gu[row / 3][row % 3] - gd[row / 3][row % 3]) / (2.0 * step);
-                    assert!((hessian.as_mat()[(row, column)] - second).abs() < 1e-8, "{shape:?} {row} {column}");
+                    assert!(
+                        (hessian.as_mat()[(row, column)] - second).abs() < 1e-8,
+                        "{shape:?} {row} {column}"
+                    );
                 }
             }
         }

@@ -34,7 +34,6 @@ pub fn annealing(trace: &[TracePoint]) -> Result<Figure, ChartError> {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         root.fill(&WHITE).map_err(failed)?;
         let sweeps = trace.last().map_or(1.0, |record| as_f64(record.sweep));
-        let least = trace.iter().map(|record| record.energy).fold(f64::INFINITY, f64::min);
         let most = trace.iter().map(|record| record.energy).fold(f64::MIN_POSITIVE, f64::max);
         let mut chart = ChartBuilder::on(&root)
             .caption("Annealing of the seeds", (FONT, 22).into_font().color(&rgb(INK)))
@@ -42,11 +41,11 @@ pub fn annealing(trace: &[TracePoint]) -> Result<Figure, ChartError> {
             .x_label_area_size(48)
             .y_label_area_size(74)
             .right_y_label_area_size(64)
-            .build_cartesian_2d(0.0..sweeps, (0.9 * least.min(most)..1.1 * most).log_scale())
+            .build_cartesian_2d(0.0..sweeps, 0.0..1.05 * most)
             .map_err(failed)?
             .set_secondary_coord(0.0..sweeps, 0.0..1.0);
         style(&mut chart)?;
-        let energy = trace.iter().map(|record| (as_f64(record.sweep), record.energy.max(f64::MIN_POSITIVE)));
+        let energy = trace.iter().map(|record| (as_f64(record.sweep), record.energy));
         chart
             .draw_series(LineSeries::new(energy, rgb(BLUE).stroke_width(2)))
             .map_err(failed)?
@@ -92,7 +91,7 @@ where
         .axis_desc_style(text())
         .label_style(text())
         .x_label_formatter(&|value| format!("{value:.0}"))
-        .y_label_formatter(&|value| format!("{value:.3}"))
+        .y_label_formatter(&|value| format!("{value:.1}"))
         .light_line_style(WHITE)
         .draw()
         .map_err(failed)?;

@@ -86,8 +86,7 @@ pub(crate) fn curve_points(nodes: usize, count: usize) -> Vec<CurvePoint> {
     gauss(count)
         .into_iter()
         .map(|(t, weight)| {
-            let (value, dt) =
-                if nodes == 3 { quadratic(t) } else { ([1.0 - t, t, 0.0], [-1.0, 1.0, 0.0]) };
+            let (value, dt) = if nodes == 3 { quadratic(t) } else { ([1.0 - t, t, 0.0], [-1.0, 1.0, 0.0]) };
             CurvePoint { weight, value, dt }
         })
         .collect()

@@ -130,9 +130,8 @@ impl Strips {
         let mut elements = Vec::with_capacity(self.along * self.through);
         for j in 0..self.through {
             for i in 0..self.along {
-                let nodes = (0..9)
-                    .map(|at| self.film_node(network, edge, 2 * i + at % 3, 2 * j + at / 3))
-                    .collect();
+                let nodes =
+                    (0..9).map(|at| self.film_node(network, edge, 2 * i + at % 3, 2 * j + at / 3)).collect();
                 elements.push(Element { shape: Shape::Quad9, nodes });
             }
         }
@@ -203,9 +202,8 @@ impl Strips {
                     a.lerp(b, part) + bend
                 })
                 .collect();
-            let foot = |wall: usize, p: DVec3| {
-                gap.walls()[wall].project(p).map_err(|_| NoExtrusion { place: p })
-            };
+            let foot =
+                |wall: usize, p: DVec3| gap.walls()[wall].project(p).map_err(|_| NoExtrusion { place: p });
             let low = foot(0, through[0])?;
             let high = foot(1, through[self.rows() - 1])?;
             for row in 0..self.rows() {
@@ -217,8 +215,7 @@ impl Strips {
     }
 
     fn straight_column(self, gap: &Gap, p: DVec3) -> Result<Vec<DVec3>, NoExtrusion> {
-        let foot =
-            |wall: usize| gap.walls()[wall].project(p).map_err(|_| NoExtrusion { place: p });
+        let foot = |wall: usize| gap.walls()[wall].project(p).map_err(|_| NoExtrusion { place: p });
         let (low, high) = (foot(0)?, foot(1)?);
         let last = real(self.rows() - 1);
         Ok((0..self.rows()).map(|row| low.lerp(high, real(row) / last)).collect())
@@ -279,7 +276,9 @@ impl Strips {
 
 /// A foot on a wall was not found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("the films cannot be extruded: no foot on a wall was found from {place}; is the gap too wide for one layer there?")]
+#[error(
+    "the films cannot be extruded: no foot on a wall was found from {place}; is the gap too wide for one layer there?"
+)]
 pub struct NoExtrusion {
     /// From where.
     pub place: DVec3,

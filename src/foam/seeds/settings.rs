@@ -80,11 +80,11 @@ impl SeedSettings {
         let stiffness = surface_stiffness.unwrap_or(1.0);
         for (name, value, low, high) in [
             ("anneal diameter", diameter, 0.5, 2.5),
-            ("hot temperature", hot, f64::MIN_POSITIVE, 1e3),
-            ("cold temperature", cold, f64::MIN_POSITIVE, 1e3),
-            ("surface stiffness", stiffness, f64::MIN_POSITIVE, 1e12),
+            ("hot temperature", hot, 1e-12, 1e3),
+            ("cold temperature", cold, 1e-12, 1e3),
+            ("surface stiffness", stiffness, 1e-12, 1e12),
             ("polish range", range, 1.1, 4.0),
-            ("polish tolerance", tolerance, f64::MIN_POSITIVE, 1e3),
+            ("polish tolerance", tolerance, 1e-12, 1e3),
         ] {
             if !(low..=high).contains(&value) {
                 faults.push(SeedFault::OutOfRange { name, value, low, high });
@@ -130,7 +130,7 @@ impl Default for PolishSettings {
 pub enum SeedFault {
     /// Fewer cells than can cover a surface.
     #[error(
-        "{count} cells cannot cover a surface with three cells at every corner: ask for at least {FEWEST_CELLS}, and on a periodic \
+        "N = {count}: so few cells cannot cover a surface with three cells at every corner: ask for at least {FEWEST_CELLS}, and on a periodic \
          surface for enough that no cell touches itself"
     )]
     TooFew {

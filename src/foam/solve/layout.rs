@@ -67,7 +67,8 @@ impl Layout {
                 unknowns - 1
             })
         };
-        let of_freedom: Vec<Option<usize>> = (0..count).map(|freedom| next(!held.contains(&freedom))).collect();
+        let of_freedom: Vec<Option<usize>> =
+            (0..count).map(|freedom| next(!held.contains(&freedom))).collect();
         let gauged = gauged_cells(complex);
         let of_pressure: IndexVec<RegionId, Option<usize>> = complex
             .regions
@@ -158,7 +159,8 @@ fn film_layout(
     }
     found.sort_unstable();
     found.dedup();
-    let own: Vec<usize> = found.iter().flat_map(|&node| freedoms[node].0..freedoms[node].0 + freedoms[node].1).collect();
+    let own: Vec<usize> =
+        found.iter().flat_map(|&node| freedoms[node].0..freedoms[node].0 + freedoms[node].1).collect();
     let mut unknowns: Vec<Option<usize>> = own.iter().map(|&freedom| of_freedom[freedom]).collect();
     unknowns.extend([of_pressure[film.back.region], of_pressure[film.front.region]]);
     FilmLayout { nodes, rows, inner, freedoms: own, unknowns }

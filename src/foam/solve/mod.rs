@@ -205,9 +205,10 @@ impl System {
         let most = |values: &[f64]| {
             values.iter().fold(0.0, |most: f64, x| if x.is_nan() { f64::NAN } else { most.max(x.abs()) })
         };
-        let force = inner.iter().map(|film| most(film)).fold(most(&freedoms), |a, b| {
-            if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-        });
+        let force = inner
+            .iter()
+            .map(|film| most(film))
+            .fold(most(&freedoms), |a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) });
         let residuals = Residuals { force, volume: most(pressures.as_slice()) };
         (Direction { freedoms, inner, pressures }, residuals)
     }

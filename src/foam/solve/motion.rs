@@ -84,9 +84,8 @@ impl Frames {
                 }
             }
             for edge in element.shape.edges() {
-                let bounding = |&at: &usize| {
-                    !matches!(complex.nodes[element.nodes[at].node].motion, Motion::Inner(_))
-                };
+                let bounding =
+                    |&at: &usize| !matches!(complex.nodes[element.nodes[at].node].motion, Motion::Inner(_));
                 if !edge.iter().all(bounding) {
                     continue;
                 }

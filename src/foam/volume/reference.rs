@@ -73,8 +73,7 @@ impl Reference {
     /// The origins of a film's back and front region, in the film's frame.
     #[must_use]
     pub fn origins(&self, complex: &Complex, film: &Film) -> [DVec3; 2] {
-        [film.back, film.front]
-            .map(|side| self.anchors[side.region] + complex.period.translation(side.shift))
+        [film.back, film.front].map(|side| self.anchors[side.region] + complex.period.translation(side.shift))
     }
 
     /// The direction along which `wall` is reached from a node.
