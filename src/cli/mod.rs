@@ -5,7 +5,6 @@
 //!
 //! | command | file |
 //! |---|---|
-//! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `enclosure` | `enclosure.rs` |
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_batch.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |

@@ -10,7 +10,6 @@
 //! | colours that colour-blind readers tell apart | `palette.rs` |
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
 //! | the foam's picture, charts, tables and meshes | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
-//! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs` |
 
 pub mod enclosure;
 pub mod enclosure_drawing;

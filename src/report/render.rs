@@ -235,17 +235,6 @@ impl Canvas {
         sample.colour.map(|c| f32::from(c) * light + shine)
     }
 
-    /// Where the neighbourhood of a sample is probed for what shades it: steps in columns and rows.
-    #[expect(clippy::cast_possible_truncation, reason = "a fraction of the picture's height")]
-    fn ring(&self) -> Vec<(isize, isize)> {
-        let reach = f64::from(self.height * SAMPLES / 60).max(3.0);
-        let probe = |step: i32, part: f64| {
-            let at = part * reach * DVec2::from_angle(f64::from(step) * std::f64::consts::TAU / 12.0);
-            (at.x as isize, at.y as isize)
-        };
-        (0..12).flat_map(|step| [probe(step, 0.35), probe(step, 1.0)]).collect()
-    }
-
     /// How open the sample lies (1 in the open, less in corners) and whether it stands at an outline (below 1).
     #[expect(
         clippy::cast_possible_wrap,
@@ -267,13 +256,6 @@ impl Canvas {
             .filter(|&above| above > 0.1 * reach && above < 4.0 * reach)
             .map(|above| (above / reach).min(1.0) / ring.len() as f32)
             .sum();
-        let mut hidden = 0.0;
-        for &(dx, dy) in ring {
-            let above = at(dx, dy) - depth;
-            if above > 0.1 * reach && above < 4.0 * reach {
-                hidden += f64::from((above / reach).min(1.0)) / 24.0;
-            }
-        }
         let step = 0.3 * reach;
         let outline = [(2, 0), (-2, 0), (0, 2), (0, -2)].into_iter().any(|(dx, dy)| {
             let there = at(dx, dy);
