@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`units`], [`index`] | lengths with their unit; indices that know what they index |
 //! | [`surface`] | level sets, curvature, nearest points, the gap |
+//! | [`foam`] | the ideal foam between two walls: seeds, partition, relaxed films |
 //! | [`tessellation`] | who touches whom, sides, defects, distributions |
 //! | [`report`] | tables, figures, files |
 //!
@@ -17,6 +18,7 @@
 
 pub mod comb;
 pub mod enclosure;
+pub mod foam;
 pub mod index;
 pub mod mesh;
 pub mod report;

@@ -1,9 +1,22 @@
-//! What happens at Ctrl-C.
+//! What happens at Ctrl-C: files on their way are removed, or the work ends at the next safe place.
 
-use std::{fs, path::Path, process};
+use std::{
+    fs,
+    ops::ControlFlow,
+    path::Path,
+    process,
+    sync::{
+        Once,
+        atomic::{AtomicBool, Ordering},
+    },
+};
 
 /// The exit code of a program ended by an interrupt: 128 + SIGINT.
 const INTERRUPTED: i32 = 130;
+
+/// Whether an interrupt was asked for since [`listen`].
+static ASKED: AtomicBool = AtomicBool::new(false);
+static LISTENING: Once = Once::new();
 
 /// At Ctrl-C (or a polite kill) removes the files on their way and ends. What the output folder held is untouched.
 ///
@@ -18,4 +31,23 @@ pub(super) fn remove_on_interrupt(staging: &Path) {
     if let Err(error) = set {
         eprintln!("note: Ctrl-C will leave temporary files: {error}");
     }
+}
+
+/// From now on Ctrl-C only asks to stop, as [`flow`] tells. A second one ends the program at once.
+pub(super) fn listen() {
+    LISTENING.call_once(|| {
+        let set = ctrlc::set_handler(|| {
+            if ASKED.swap(true, Ordering::SeqCst) {
+                process::exit(INTERRUPTED);
+            }
+        });
+        if let Err(error) = set {
+            eprintln!("note: Ctrl-C will end the program without a checkpoint: {error}");
+        }
+    });
+}
+
+/// Whether to go on.
+pub(super) fn flow() -> ControlFlow<()> {
+    if ASKED.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }

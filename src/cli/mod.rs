@@ -5,8 +5,9 @@
 //!
 //! | command | file |
 //! |---|---|
-//! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `enclosure` | `enclosure.rs` |
+//! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_batch.rs` |
+//! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
@@ -17,6 +18,10 @@ mod comb;
 mod comb_render;
 mod comb_score;
 mod enclosure;
+mod foam;
+mod foam_batch;
+mod foam_run;
+mod foam_settings;
 mod interrupt;
 mod manual;
 mod outcome;
@@ -40,6 +45,7 @@ struct Arguments {
 enum Command {
     /// Build an enclosure: two shells with a gap for bees, and a base, as parts that print
     Enclosure(Box<enclosure::EnclosureArguments>),
+    Foam(Box<foam::FoamArguments>),
     /// Read the cells of comb and their numbers of sides from photographs
     Comb(Box<comb::CombArguments>),
     /// Print a completion script for a shell to stdout
@@ -54,6 +60,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let ended = match arguments.command {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
+        Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),

@@ -9,6 +9,7 @@
 //! | shaded triangles in a picture | `render.rs` |
 //! | colours that colour-blind readers tell apart | `palette.rs` |
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
+//! | the foam's picture, charts, tables and meshes | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
 
 pub mod comb;
@@ -17,6 +18,9 @@ pub mod enclosure;
 pub mod enclosure_drawing;
 pub mod enclosure_section;
 pub mod figure;
+pub mod foam_chart;
+pub mod foam_files;
+pub mod foam_picture;
 pub mod folder;
 pub mod palette;
 pub mod render;

@@ -1,0 +1,225 @@
+//! From what was typed about a foam to what is meant, with all faults at once.
+
+use super::foam::{DensityName, FoamArguments, StageName, SurfaceName};
+use crate::foam::{
+    seeds::{Density, SeedSettings},
+    setup::{FoamSpace, PeriodicSurface, PeriodicWalls},
+};
+use serde::Serialize;
+use std::{fmt, path::PathBuf};
+
+/// The most cells of one foam. The memory of the sparse factors grows like N^1.3: beyond this no desktop holds them.
+const MOST_CELLS: usize = 20_000;
+
+/// The most cells of a partition alone.
+const MOST_PARTITION_CELLS: usize = 200_000;
+
+/// The most runs of a batch.
+const MOST_RUNS: u64 = 100_000;
+
+/// The most threads.
+const MOST_JOBS: usize = 1024;
+
+/// The last step of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Stage {
+    Seeds,
+    Partition,
+}
+
+/// What a run of `combwright foam` shall do.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct FoamSettings {
+    pub(super) space: FoamSpace,
+    pub(super) seeds: SeedSettings,
+    pub(super) last_stage: Stage,
+    pub(super) runs: u64,
+    #[serde(skip)]
+    pub(super) jobs: Option<usize>,
+    #[serde(skip)]
+    pub(super) output: PathBuf,
+}
+
+/// Everything that is wrong with what was typed.
+#[derive(Debug)]
+pub(super) struct Faults(Vec<String>);
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0[..] {
+            [only] => f.write_str(only),
+            all => {
+                write!(f, "{} faults in the arguments:", all.len())?;
+                all.iter().try_for_each(|fault| write!(f, "\n  - {fault}"))
+            }
+        }
+    }
+}
+
+impl std::error::Error for Faults {}
+
+impl FoamSettings {
+    /// The settings that the arguments mean.
+    pub(super) fn from_arguments(arguments: &FoamArguments) -> Result<Self, Faults> {
+        let mut faults = unused(arguments);
+        let space = space(arguments, &mut faults);
+        if let Err(error) = space.gap()
+            && faults.is_empty()
+        {
+            faults.push(error.to_string());
+        }
+        let seeds = seeds(arguments);
+        faults.extend(seeds.faults().iter().map(ToString::to_string));
+        let last_stage = match arguments.stop_after {
+            Some(StageName::Seeds) => Stage::Seeds,
+            Some(StageName::Partition) | None => Stage::Partition,
+        };
+        faults.extend(too_much(arguments));
+        if !faults.is_empty() {
+            return Err(Faults(faults));
+        }
+        Ok(Self {
+            space,
+            seeds,
+            last_stage,
+            runs: arguments.runs,
+            jobs: arguments.jobs,
+            output: arguments.output.clone(),
+        })
+    }
+
+    /// The same with another seed of the random numbers.
+    pub(super) fn with_seed(&self, seed: u64) -> Self {
+        Self { seeds: SeedSettings { seed, ..self.seeds }, ..self.clone() }
+    }
+}
+
+fn seeds(arguments: &FoamArguments) -> SeedSettings {
+    let mut seeds = SeedSettings::new(arguments.cells, arguments.seed);
+    seeds.density = match arguments.density {
+        DensityName::Gap => Density::Gap,
+        DensityName::Uniform => Density::Uniform,
+    };
+    seeds.lloyd_steps = arguments.lloyd;
+    let anneal = &mut seeds.anneal;
+    anneal.sweeps = arguments.sweeps.unwrap_or(anneal.sweeps);
+    anneal.diameter = arguments.disc.unwrap_or(anneal.diameter);
+    anneal.hot = arguments.hot.unwrap_or(anneal.hot);
+    anneal.cold = arguments.cold.unwrap_or(anneal.cold);
+    seeds
+}
+
+/// The space that was meant; missing and malformed numbers become faults.
+fn space(arguments: &FoamArguments, faults: &mut Vec<String>) -> FoamSpace {
+    match arguments.surface {
+        SurfaceName::SchwarzP => periodic(arguments, PeriodicSurface::SchwarzP),
+        SurfaceName::Gyroid => periodic(arguments, PeriodicSurface::Gyroid),
+        SurfaceName::Diamond => periodic(arguments, PeriodicSurface::Diamond),
+        SurfaceName::Sphere => {
+            FoamSpace::Sphere { radii: pair("--radii", arguments.radii.as_deref(), faults) }
+        }
+        SurfaceName::Torus => FoamSpace::Torus {
+            ring: needed("--ring", arguments.ring, faults),
+            tubes: pair("--tube", arguments.tube.as_deref(), faults),
+        },
+        SurfaceName::Plane => FoamSpace::Plane {
+            periods: pair("--periods", arguments.periods.as_deref(), faults),
+            height: needed("--height", arguments.height, faults),
+        },
+    }
+}
+
+fn periodic(arguments: &FoamArguments, kind: PeriodicSurface) -> FoamSpace {
+    let walls = match arguments.parallel {
+        Some(gap) => PeriodicWalls::Parallel { gap },
+        None => PeriodicWalls::LevelSet { delta: arguments.delta.unwrap_or(0.2) },
+    };
+    FoamSpace::Periodic { kind, period: arguments.period.unwrap_or(1.0), walls }
+}
+
+fn needed(option: &str, value: Option<f64>, faults: &mut Vec<String>) -> f64 {
+    value.unwrap_or_else(|| {
+        faults.push(format!("this surface needs {option}"));
+        f64::NAN
+    })
+}
+
+fn pair(option: &str, values: Option<&[f64]>, faults: &mut Vec<String>) -> [f64; 2] {
+    match values {
+        Some(&[first, second]) => [first, second],
+        Some(other) => {
+            faults.push(format!("{option} takes two numbers with a comma between them, not {}", other.len()));
+            [f64::NAN; 2]
+        }
+        None => {
+            faults.push(format!("this surface needs {option}, two numbers with a comma between them"));
+            [f64::NAN; 2]
+        }
+    }
+}
+
+/// Options that the chosen surface does not have: better said than ignored.
+fn unused(arguments: &FoamArguments) -> Vec<String> {
+    let kind = match arguments.surface {
+        SurfaceName::SchwarzP | SurfaceName::Gyroid | SurfaceName::Diamond => "a triply periodic surface",
+        SurfaceName::Sphere => "a sphere",
+        SurfaceName::Torus => "a torus",
+        SurfaceName::Plane => "a plane",
+    };
+    let given = [
+        ("--period", arguments.period.is_some(), "a triply periodic surface"),
+        ("--delta", arguments.delta.is_some(), "a triply periodic surface"),
+        ("--parallel", arguments.parallel.is_some(), "a triply periodic surface"),
+        ("--radii", arguments.radii.is_some(), "a sphere"),
+        ("--tube", arguments.tube.is_some(), "a torus"),
+        ("--ring", arguments.ring.is_some(), "a torus"),
+        ("--periods", arguments.periods.is_some(), "a plane"),
+        ("--height", arguments.height.is_some(), "a plane"),
+    ];
+    given
+        .into_iter()
+        .filter(|(_, is_given, of)| *is_given && *of != kind)
+        .map(|(option, _, of)| format!("{option} belongs to {of}, but the surface is {kind}"))
+        .collect()
+}
+
+/// Sizes that no machine at hand can do.
+fn too_much(arguments: &FoamArguments) -> Vec<String> {
+    let mut faults = Vec::new();
+    let most = if arguments.stop_after.is_some() { MOST_PARTITION_CELLS } else { MOST_CELLS };
+    if arguments.cells > most {
+        faults.push(format!(
+            "{} cells are too many: a foam of them would need about {} of memory and {} on two cores; the most is {most}{}",
+            arguments.cells,
+            memory(arguments.cells),
+            duration(arguments.cells),
+            if arguments.stop_after.is_some() { "" } else { " (200000 with --stop-after partition)" },
+        ));
+    }
+    if !(1..=MOST_RUNS).contains(&arguments.runs) {
+        faults.push(format!("--runs {} must lie between 1 and {MOST_RUNS}", arguments.runs));
+    }
+    if let Some(jobs) = arguments.jobs
+        && !(1..=MOST_JOBS).contains(&jobs)
+    {
+        faults.push(format!("-j {jobs} must lie between 1 and {MOST_JOBS} threads"));
+    }
+    faults
+}
+
+/// About how much memory a foam needs: 4 GB for 4000 cells, growing like N^1.3.
+fn memory(cells: usize) -> String {
+    format!("{:.0} GB", 4.0 * relative(cells).powf(1.3))
+}
+
+/// About how long it takes: 4 minutes for 4000 cells, growing like N^1.3.
+fn duration(cells: usize) -> String {
+    let hours = 4.0 / 60.0 * relative(cells).powf(1.3);
+    if hours < 48.0 { format!("{hours:.0} hours") } else { format!("{:.0} days", hours / 24.0) }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "an estimate")]
+fn relative(cells: usize) -> f64 {
+    cells as f64 / 4000.0
+}

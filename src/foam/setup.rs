@@ -1,0 +1,249 @@
+//! What a foam is made in: a surface, its two walls and how space ends, as plain numbers that a file can keep.
+
+use super::domain::Domain;
+use crate::{
+    surface::{Diamond, Gap, GapError, Gyroid, LevelSet, Plane, SchwarzP, Sphere, Torus},
+    units::LevelOffset,
+};
+use serde::{Deserialize, Serialize};
+use std::{fmt, sync::Arc};
+
+/// The triply periodic surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PeriodicSurface {
+    /// Schwarz' P, nodal.
+    SchwarzP,
+    /// Schoen's gyroid, nodal.
+    Gyroid,
+    /// Schwarz' D, nodal.
+    Diamond,
+}
+
+/// The walls of a gap round a triply periodic surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PeriodicWalls {
+    /// Φ = ±δ.
+    LevelSet {
+        /// δ.
+        delta: f64,
+    },
+    /// True offsets to both sides.
+    Parallel {
+        /// Their distance from each other, in the unit of the period.
+        gap: f64,
+    },
+}
+
+/// The space that a foam fills.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "surface", rename_all = "kebab-case")]
+pub enum FoamSpace {
+    /// One period of the gap round a triply periodic surface, with periodic boundaries.
+    Periodic {
+        /// Which.
+        kind: PeriodicSurface,
+        /// The period; lengths of the foam are in its unit.
+        period: f64,
+        /// The walls.
+        walls: PeriodicWalls,
+    },
+    /// The shell between two concentric spheres.
+    Sphere {
+        /// The radii, the smaller first.
+        radii: [f64; 2],
+    },
+    /// The shell between two tori of one centre circle.
+    Torus {
+        /// The radius of the centre circle.
+        ring: f64,
+        /// The radii of the tubes, the smaller first.
+        tubes: [f64; 2],
+    },
+    /// The slab between two planes, periodic along x and y.
+    Plane {
+        /// The periods.
+        periods: [f64; 2],
+        /// The distance of the planes.
+        height: f64,
+    },
+}
+
+/// Why a space is none.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SpaceError {
+    /// A length that is none.
+    #[error("the {what} is {value}: it must be a positive number")]
+    NotPositive {
+        /// Which.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Two radii the wrong way round, or equal.
+    #[error("the {what} are {inner} and {outer}: the second must be larger than the first")]
+    Order {
+        /// Which.
+        what: &'static str,
+        /// The first.
+        inner: f64,
+        /// The second.
+        outer: f64,
+    },
+    /// The outer tube reaches the axis.
+    #[error(
+        "the outer tube {outer} is not smaller than the ring {ring}: the torus would meet itself on its axis"
+    )]
+    Ring {
+        /// The radius of the outer tube.
+        outer: f64,
+        /// The radius of the centre circle.
+        ring: f64,
+    },
+    /// The walls do not exist.
+    #[error(transparent)]
+    Gap(#[from] GapError),
+}
+
+impl FoamSpace {
+    /// The gap between the walls. The middle surface lies half-way.
+    ///
+    /// # Errors
+    /// [`SpaceError`] if a number makes no sense or the walls do not exist.
+    pub fn gap(&self) -> Result<Gap, SpaceError> {
+        match *self {
+            Self::Periodic { kind, period, walls } => {
+                positive("period", period)?;
+                Ok(match walls {
+                    PeriodicWalls::LevelSet { delta } => {
+                        Gap::level_set(kind.level_set(period), LevelOffset(delta))?
+                    }
+                    PeriodicWalls::Parallel { gap } => Gap::parallel(kind.level_set(period), gap, 0.0)?,
+                })
+            }
+            Self::Sphere { radii } => {
+                let (radius, half) = halfway("radii of the spheres", radii)?;
+                Ok(Gap::between(Arc::new(Sphere { radius }), [-half, half])?)
+            }
+            Self::Torus { ring, tubes } => {
+                positive("ring", ring)?;
+                let (tube, half) = halfway("radii of the tubes", tubes)?;
+                if tubes[1] >= ring {
+                    return Err(SpaceError::Ring { outer: tubes[1], ring });
+                }
+                Ok(Gap::between(Arc::new(Torus { ring, tube }), [-half, half])?)
+            }
+            Self::Plane { periods, height } => {
+                positive("first period", periods[0])?;
+                positive("second period", periods[1])?;
+                positive("height", height)?;
+                Ok(Gap::between(Arc::new(Plane { periods }), [-0.5 * height, 0.5 * height])?)
+            }
+        }
+    }
+
+    /// How space ends: one period, or open round a bounded gap.
+    ///
+    /// # Errors
+    /// As [`FoamSpace::gap`].
+    pub fn domain(&self) -> Result<Domain, SpaceError> {
+        Ok(Domain::of_surface(self.gap()?.middle().as_ref()))
+    }
+}
+
+impl PeriodicSurface {
+    fn level_set(self, period: f64) -> Arc<dyn LevelSet> {
+        match self {
+            Self::SchwarzP => Arc::new(SchwarzP { period }),
+            Self::Gyroid => Arc::new(Gyroid { period }),
+            Self::Diamond => Arc::new(Diamond { period }),
+        }
+    }
+}
+
+impl fmt::Display for FoamSpace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Periodic { kind, period, walls } => {
+                let name = match kind {
+                    PeriodicSurface::SchwarzP => "Schwarz P",
+                    PeriodicSurface::Gyroid => "gyroid",
+                    PeriodicSurface::Diamond => "diamond",
+                };
+                write!(f, "{name}, period {period}, ")?;
+                match walls {
+                    PeriodicWalls::LevelSet { delta } => write!(f, "walls Φ = ±{delta}"),
+                    PeriodicWalls::Parallel { gap } => write!(f, "parallel walls, gap {gap}"),
+                }
+            }
+            Self::Sphere { radii: [inner, outer] } => write!(f, "spheres of radius {inner} and {outer}"),
+            Self::Torus { ring, tubes: [inner, outer] } => {
+                write!(f, "tori of ring {ring}, tubes {inner} and {outer}")
+            }
+            Self::Plane { periods: [x, y], height } => {
+                write!(f, "planes {height} apart, periods {x} and {y}")
+            }
+        }
+    }
+}
+
+fn positive(what: &'static str, value: f64) -> Result<(), SpaceError> {
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(SpaceError::NotPositive { what, value }) }
+}
+
+/// The mean of two radii and half their difference.
+fn halfway(what: &'static str, [inner, outer]: [f64; 2]) -> Result<(f64, f64), SpaceError> {
+    positive(what, inner)?;
+    positive(what, outer)?;
+    if outer <= inner {
+        return Err(SpaceError::Order { what, inner, outer });
+    }
+    Ok((0.5 * (inner + outer), 0.5 * (outer - inner)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::WallSide;
+    use glam::DVec3;
+
+    #[test]
+    fn walls_lie_where_they_were_asked_for() -> Result<(), SpaceError> {
+        let gap = FoamSpace::Sphere { radii: [1.0, 1.2] }.gap()?;
+        assert!(gap.wall(WallSide::Upper).value(DVec3::new(0.0, 1.2, 0.0)).abs() < 1e-15);
+        let gap = FoamSpace::Torus { ring: 5.0, tubes: [0.9, 1.0] }.gap()?;
+        assert!(gap.wall(WallSide::Lower).value(DVec3::new(5.9, 0.0, 0.0)).abs() < 1e-15);
+        let gap = FoamSpace::Plane { periods: [3.0, 4.0], height: 0.5 }.gap()?;
+        assert!(gap.wall(WallSide::Lower).value(DVec3::new(1.0, 1.0, -0.25)).abs() < 1e-15);
+        Ok(())
+    }
+
+    #[test]
+    fn spaces_that_are_none_are_refused() {
+        let kind = PeriodicSurface::SchwarzP;
+        for space in [
+            FoamSpace::Sphere { radii: [1.0, 1.0] },
+            FoamSpace::Sphere { radii: [-1.0, 1.0] },
+            FoamSpace::Sphere { radii: [f64::NAN, 1.0] },
+            FoamSpace::Torus { ring: 1.0, tubes: [0.9, 1.0] },
+            FoamSpace::Torus { ring: 0.0, tubes: [0.9, 1.0] },
+            FoamSpace::Plane { periods: [0.0, 1.0], height: 0.5 },
+            FoamSpace::Plane { periods: [1.0, 1.0], height: f64::INFINITY },
+            FoamSpace::Periodic { kind, period: 1.0, walls: PeriodicWalls::LevelSet { delta: 1.0 } },
+            FoamSpace::Periodic { kind, period: -1.0, walls: PeriodicWalls::LevelSet { delta: 0.2 } },
+            FoamSpace::Periodic { kind, period: 1.0, walls: PeriodicWalls::Parallel { gap: 0.5 } },
+        ] {
+            assert!(space.gap().is_err(), "{space}");
+        }
+    }
+
+    #[test]
+    fn a_file_keeps_a_space() -> Result<(), serde_json::Error> {
+        let walls = PeriodicWalls::LevelSet { delta: 0.2 };
+        let space = FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period: 1.0, walls };
+        let text = serde_json::to_string(&space)?;
+        assert_eq!(serde_json::from_str::<FoamSpace>(&text)?, space);
+        Ok(())
+    }
+}

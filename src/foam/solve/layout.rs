@@ -1,0 +1,204 @@
+//! Which unknowns there are: the freedoms of the bounding nodes, then the pressures; the inner nodes of each film are
+//! condensed out and have no number here.
+
+use super::rigid;
+use crate::{
+    foam::complex::{Complex, Film, Motion, NodeId, NodeImage, Places, RegionId, RegionKind},
+    index::{Id, IndexVec},
+};
+use faer::sparse::{Argsort, Pair, SymbolicSparseColMat};
+use std::collections::BTreeMap;
+
+/// The nodes and freedoms of a film.
+#[derive(Clone, Debug)]
+pub(super) struct FilmLayout {
+    /// The distinct nodes, in the film's frame.
+    pub(super) nodes: Vec<NodeImage>,
+    /// For each element, the rows of its nodes in `nodes`.
+    pub(super) rows: Vec<Vec<usize>>,
+    /// The rows of the inner nodes.
+    pub(super) inner: Vec<usize>,
+    /// The freedoms of the bounding nodes that move this film, in order.
+    pub(super) freedoms: Vec<usize>,
+    /// The unknowns: those of `freedoms`, then the pressures of back and front; `None` where held.
+    pub(super) unknowns: Vec<Option<usize>>,
+}
+
+/// The unknowns of a complex and the pattern of their matrix.
+#[derive(Debug)]
+pub(super) struct Layout {
+    /// The first freedom of each bounding node, and how many it has.
+    pub(super) freedoms: IndexVec<NodeId, (usize, usize)>,
+    /// The unknown of each freedom; `None` where it is held to fix a rigid motion.
+    pub(super) of_freedom: Vec<Option<usize>>,
+    /// The unknown of each region's pressure; `None` for the open air and for one cell of a closed foam, whose volume
+    /// follows from the others.
+    pub(super) of_pressure: IndexVec<RegionId, Option<usize>>,
+    /// All unknowns.
+    pub(super) unknowns: usize,
+    /// How many of them are pressures.
+    pub(super) pressures: usize,
+    pub(super) films: Vec<FilmLayout>,
+    pub(super) pattern: SymbolicSparseColMat<usize>,
+    pub(super) order: Argsort<usize>,
+}
+
+impl Layout {
+    pub(super) fn new(complex: &Complex, places: &Places) -> Self {
+        let mut count = 0;
+        let freedoms: IndexVec<NodeId, (usize, usize)> = complex
+            .nodes
+            .iter()
+            .map(|node| {
+                let own = match node.motion {
+                    Motion::Free => 3 - node.walls.len().min(3),
+                    Motion::Border(_) => 2,
+                    Motion::Inner(_) => 0,
+                };
+                count += own;
+                (count - own, own)
+            })
+            .collect();
+        let held = rigid::held_freedoms(complex, places, &freedoms);
+        let mut unknowns = 0;
+        let mut next = |free: bool| {
+            free.then(|| {
+                unknowns += 1;
+                unknowns - 1
+            })
+        };
+        let of_freedom: Vec<Option<usize>> =
+            (0..count).map(|freedom| next(!held.contains(&freedom))).collect();
+        let gauged = gauged_cells(complex);
+        let of_pressure: IndexVec<RegionId, Option<usize>> = complex
+            .regions
+            .enumerated()
+            .map(|(id, region)| next(region.kind == RegionKind::Cell && !gauged.contains(&id)))
+            .collect();
+        let pressures = of_pressure.iter().flatten().count();
+        let films: Vec<FilmLayout> = complex
+            .films
+            .iter()
+            .map(|film| film_layout(complex, film, &freedoms, &of_freedom, &of_pressure))
+            .collect();
+        let (pattern, order) = pattern(&films, &freedoms, &of_freedom, unknowns);
+        Self { freedoms, of_freedom, of_pressure, unknowns, pressures, films, pattern, order }
+    }
+}
+
+/// One cell of every part of the foam that does not touch the open air: the walls fix the sum of such a part's volumes.
+fn gauged_cells(complex: &Complex) -> Vec<RegionId> {
+    let mut part: Vec<usize> = (0..complex.regions.len()).collect();
+    fn root(part: &mut [usize], mut at: usize) -> usize {
+        while part[at] != at {
+            part[at] = part[part[at]];
+            at = part[at];
+        }
+        at
+    }
+    for film in &complex.films {
+        let (a, b) = (root(&mut part, film.back.region.index()), root(&mut part, film.front.region.index()));
+        part[a.max(b)] = a.min(b);
+    }
+    let mut open = vec![false; part.len()];
+    for (id, region) in complex.regions.enumerated() {
+        let at = root(&mut part, id.index());
+        open[at] |= region.kind == RegionKind::Open;
+    }
+    (0..part.len()).filter(|&at| part[at] == at && !open[at]).map(RegionId::from_index).collect()
+}
+
+/// The bounding nodes that a node's motion depends on, itself included if it is one.
+fn bounding(complex: &Complex, node: NodeId, found: &mut Vec<NodeId>) {
+    match &complex.nodes[node].motion {
+        Motion::Free => found.push(node),
+        Motion::Border(masters) => {
+            found.push(node);
+            found.extend(masters.iter().map(|&(master, _)| master));
+        }
+        Motion::Inner(masters) => {
+            for &(master, _) in masters {
+                bounding(complex, master, found);
+            }
+        }
+    }
+}
+
+fn film_layout(
+    complex: &Complex,
+    film: &Film,
+    freedoms: &IndexVec<NodeId, (usize, usize)>,
+    of_freedom: &[Option<usize>],
+    of_pressure: &IndexVec<RegionId, Option<usize>>,
+) -> FilmLayout {
+    let mut numbers: BTreeMap<(NodeId, [i32; 3]), usize> = BTreeMap::new();
+    let mut nodes = Vec::new();
+    let rows = film
+        .elements
+        .iter()
+        .map(|element| {
+            element
+                .nodes
+                .iter()
+                .map(|&image| {
+                    *numbers.entry((image.node, image.shift.to_array())).or_insert_with(|| {
+                        nodes.push(image);
+                        nodes.len() - 1
+                    })
+                })
+                .collect()
+        })
+        .collect();
+    let mut found = Vec::new();
+    let mut inner = Vec::new();
+    for (row, image) in nodes.iter().enumerate() {
+        bounding(complex, image.node, &mut found);
+        if matches!(complex.nodes[image.node].motion, Motion::Inner(_)) {
+            inner.push(row);
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    let own: Vec<usize> =
+        found.iter().flat_map(|&node| freedoms[node].0..freedoms[node].0 + freedoms[node].1).collect();
+    let mut unknowns: Vec<Option<usize>> = own.iter().map(|&freedom| of_freedom[freedom]).collect();
+    unknowns.extend([of_pressure[film.back.region], of_pressure[film.front.region]]);
+    FilmLayout { nodes, rows, inner, freedoms: own, unknowns }
+}
+
+/// The lower triangle's entries in the order in which values are given: each film's, each bounding node's own block, the
+/// diagonal.
+fn pattern(
+    films: &[FilmLayout],
+    freedoms: &IndexVec<NodeId, (usize, usize)>,
+    of_freedom: &[Option<usize>],
+    unknowns: usize,
+) -> (SymbolicSparseColMat<usize>, Argsort<usize>) {
+    let mut entries = Vec::new();
+    for film in films {
+        entries.extend(lower_pairs(&film.unknowns).map(|(_, _, row, column)| Pair::new(row, column)));
+    }
+    for &(first, own) in freedoms {
+        let block = &of_freedom[first..first + own];
+        entries.extend(lower_pairs(block).map(|(_, _, row, column)| Pair::new(row, column)));
+    }
+    entries.extend((0..unknowns).map(|at| Pair::new(at, at)));
+    match SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, &entries) {
+        Ok(built) => built,
+        Err(error) => unreachable!("all entries lie inside the matrix: {error:?}"),
+    }
+}
+
+/// All pairs of places in `unknowns` on or below the diagonal of the matrix: the two places, then row and column.
+pub(super) fn lower_pairs(
+    unknowns: &[Option<usize>],
+) -> impl Iterator<Item = (usize, usize, usize, usize)> + '_ {
+    unknowns.iter().enumerate().flat_map(move |(i, &row)| {
+        unknowns
+            .iter()
+            .enumerate()
+            .filter_map(move |(j, &column)| Some((i, j, row?, column?)))
+            // A region on both sides of a film would appear twice; its off-diagonal pair is met twice, too, as it must.
+            .filter(|&(i, j, row, column)| row > column || (row == column && i >= j))
+    })
+}

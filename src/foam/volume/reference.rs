@@ -1,0 +1,168 @@
+//! The reference position of all wall edges, and the wall patches of the regions there.
+
+use super::{
+    super::complex::{
+        Complex, CurvePoint, Element, Film, NodeId, Places, RegionId, RegionKind, WallId, curve_points,
+        region_means,
+    },
+    wall::height,
+};
+use crate::{
+    index::{Id, IndexVec},
+    surface::Wall,
+};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::LazyLock;
+
+/// Gauss points along an edge and outward from the anchor's foot in a fan. The wall is analytic and a cell turns by less than
+/// a right angle from its middle: twelve points reach rounding there.
+const FAN_ALONG: usize = 6;
+const FAN_OUTWARD: usize = 12;
+
+static CURVES: LazyLock<[Vec<CurvePoint>; 2]> =
+    LazyLock::new(|| [curve_points(2, FAN_ALONG), curve_points(3, FAN_ALONG)]);
+static OUTWARD: LazyLock<Vec<CurvePoint>> = LazyLock::new(|| curve_points(2, FAN_OUTWARD));
+
+/// Where the wall edges were when the wall patches were last integrated.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    places: Places,
+    directions: IndexVec<NodeId, [DVec3; 2]>,
+    anchors: IndexVec<RegionId, DVec3>,
+    offsets: IndexVec<RegionId, f64>,
+}
+
+impl Reference {
+    /// Takes the present places as the reference and integrates every region's wall patches.
+    #[must_use]
+    pub fn new(complex: &Complex, places: &Places) -> Self {
+        let directions = complex
+            .nodes
+            .enumerated()
+            .map(|(id, node)| {
+                let mut at = [DVec3::ZERO; 2];
+                for (slot, &wall) in node.walls.iter().take(2).enumerate() {
+                    at[slot] = direction_at(complex, &node.walls, wall, places[id]);
+                }
+                at
+            })
+            .collect();
+        let mut reference = Self {
+            places: places.clone(),
+            directions,
+            anchors: region_means(complex, places),
+            offsets: IndexVec::from_elem(0.0, complex.regions.len()),
+        };
+        reference.offsets = reference.patches(complex);
+        reference
+    }
+
+    /// The places taken as the reference.
+    #[must_use]
+    pub fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// What the wall patches add to each region's volume.
+    #[must_use]
+    pub fn offsets(&self) -> &IndexVec<RegionId, f64> {
+        &self.offsets
+    }
+
+    /// The origins of a film's back and front region, in the film's frame.
+    #[must_use]
+    pub fn origins(&self, complex: &Complex, film: &Film) -> [DVec3; 2] {
+        [film.back, film.front].map(|side| self.anchors[side.region] + complex.period.translation(side.shift))
+    }
+
+    /// The direction along which `wall` is reached from a node.
+    #[must_use]
+    pub(crate) fn direction(&self, complex: &Complex, node: NodeId, wall: WallId) -> DVec3 {
+        let slot = usize::from(complex.nodes[node].walls.first() != Some(&wall));
+        self.directions[node][slot]
+    }
+
+    fn patches(&self, complex: &Complex) -> IndexVec<RegionId, f64> {
+        // The feet of the anchors on each wall that a region has an edge on.
+        let shares: Vec<[f64; 2]> = complex
+            .films
+            .as_slice()
+            .par_iter()
+            .map(|film| {
+                let mut share = [0.0; 2];
+                let anchors = self.origins(complex, film);
+                for element in &film.elements {
+                    for (wall, edge) in complex.wall_edges(element) {
+                        for (side, image) in [film.back, film.front].into_iter().enumerate() {
+                            if complex.regions[image.region].kind == RegionKind::Cell {
+                                share[side] += self.fan(complex, element, wall, edge, anchors[side]);
+                            }
+                        }
+                    }
+                }
+                share
+            })
+            .collect();
+        let mut offsets = IndexVec::from_elem(0.0, complex.regions.len());
+        for (film, share) in complex.films.iter().zip(shares) {
+            offsets[film.back.region] -= share[0];
+            offsets[film.front.region] += share[1];
+        }
+        offsets
+    }
+
+    /// The cone from `anchor` over the wall between the anchor's foot and an edge.
+    fn fan(
+        &self,
+        complex: &Complex,
+        element: &Element,
+        wall_id: WallId,
+        edge: &[usize],
+        anchor: DVec3,
+    ) -> f64 {
+        let wall: &Wall = &complex.walls[wall_id];
+        let Ok(foot) = wall.project(anchor) else { return f64::NAN };
+        let foot_direction = wall.field.normal(foot);
+        let node = |slot: usize| complex.place(&self.places, element.nodes[edge[slot]]);
+        let direction = |slot: usize| self.direction(complex, element.nodes[edge[slot]].node, wall_id);
+        let mut total = 0.0;
+        for curve in &CURVES[edge.len() - 2] {
+            let mut at = [DVec3::ZERO; 4];
+            for slot in 0..edge.len() {
+                at[0] += curve.value[slot] * node(slot);
+                at[1] += curve.dt[slot] * node(slot);
+                at[2] += curve.value[slot] * direction(slot);
+                at[3] += curve.dt[slot] * direction(slot);
+            }
+            let [e, et, d1, d1t] = at;
+            let mut z = 0.0;
+            for outward in OUTWARD.iter() {
+                let s = outward.value[1];
+                let y = foot + s * (e - foot);
+                let (ys, yt) = (e - foot, s * et);
+                let d = foot_direction + s * (d1 - foot_direction);
+                let (ds, dt) = (d1 - foot_direction, s * d1t);
+                z = height(wall, y, d, z);
+                let area = ys.cross(yt);
+                let bend = ds.cross(yt) + ys.cross(dt);
+                let prism =
+                    z * d.dot(area) + z * z / 2.0 * d.dot(bend) + z * z * z / 3.0 * d.dot(ds.cross(dt));
+                total += outward.weight * curve.weight * ((y - anchor).dot(area) / 3.0 + prism);
+            }
+        }
+        total
+    }
+}
+
+/// The wall's normal at `p`; where the node also lies on a second wall, its part within that wall, so that the patch's side
+/// stays on the second wall.
+fn direction_at(complex: &Complex, walls: &[WallId], wall: WallId, p: DVec3) -> DVec3 {
+    let normal = complex.walls[wall].field.normal(p);
+    let Some(other) = walls.iter().take(2).find(|&&other| other.index() != wall.index()) else {
+        return normal;
+    };
+    let across = complex.walls[*other].field.normal(p);
+    let within = normal - normal.dot(across) * across;
+    within / within.length_squared().max(f64::MIN_POSITIVE).sqrt()
+}

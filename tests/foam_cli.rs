@@ -1,0 +1,124 @@
+//! `combwright foam` from outside: what it writes, and what it says to bad input.
+
+use serde_json::Value;
+use std::{
+    error::Error,
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+type Tested = Result<(), Box<dyn Error>>;
+
+fn foam(folder: &Path, arguments: &str) -> Result<Output, std::io::Error> {
+    Command::new(env!("CARGO_BIN_EXE_combwright"))
+        .arg("foam")
+        .args(arguments.split_whitespace())
+        .arg("-o")
+        .arg(folder.join("out"))
+        .output()
+}
+
+fn json(path: &Path) -> Result<Value, Box<dyn Error>> {
+    Ok(serde_json::from_slice(&fs::read(path)?)?)
+}
+
+#[test]
+fn a_partition_is_written_whole() -> Tested {
+    let home = tempfile::tempdir()?;
+    let ended = foam(home.path(), "--cells 40 --sweeps 200 --stop-after partition")?;
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let out = home.path().join("out");
+    let summary = json(&out.join("summary.json"))?;
+    assert_eq!(summary["charge"], -24);
+    let partition = json(&out.join("partition.json"))?;
+    let cells = partition["cells"].as_array().ok_or("no cells")?;
+    assert_eq!(cells.len(), 40);
+    let volume: f64 = cells.iter().filter_map(|cell| cell["volume"].as_f64()).sum();
+    // The volume of |Φ| < 0.2; cells of this size are measured to 1e-10.
+    assert!((volume / 0.114_158_996_552_87 - 1.0).abs() < 1e-9, "{volume}");
+    for name in ["cells.csv", "pattern.json", "partition.obj", "foam.png", "anneal.svg", "run.json"] {
+        assert!(fs::metadata(out.join(name))?.len() > 0, "{name} is empty");
+    }
+    assert_eq!(fs::read_to_string(out.join("cells.csv"))?.lines().count(), 41);
+    Ok(())
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_files() -> Tested {
+    let written = |jobs: &str| -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
+        let home = tempfile::tempdir()?;
+        let ended = foam(
+            home.path(),
+            &format!("--surface sphere --radii 1,1.1 -n 20 --sweeps 100 --stop-after partition -j {jobs}"),
+        )?;
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        ["partition.json", "cells.csv", "pattern.json", "foam.png", "anneal.csv"]
+            .iter()
+            .map(|name| Ok(fs::read(home.path().join("out").join(name))?))
+            .collect()
+    };
+    assert_eq!(written("1")?, written("2")?);
+    Ok(())
+}
+
+#[test]
+fn seeds_alone_can_be_had() -> Tested {
+    let home = tempfile::tempdir()?;
+    let ended = foam(
+        home.path(),
+        "--surface plane --periods 4,4 --height 0.5 -n 16 --sweeps 50 --density uniform --stop-after seeds",
+    )?;
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(fs::read_to_string(home.path().join("out/seeds.csv"))?.lines().count(), 17);
+    assert!(!home.path().join("out/partition.json").exists());
+    Ok(())
+}
+
+#[test]
+fn bad_input_gets_one_clear_message_and_no_output() -> Tested {
+    for (arguments, says) in [
+        ("--cells 0", "N = 0"),
+        ("--cells 1", "N = 1"),
+        ("--cells 1000000", "GB of memory"),
+        ("--cells -3", "invalid value"),
+        ("--delta NaN", "NaN"),
+        ("--delta 0", "level offset is 0"),
+        ("--delta -0.1", "-0.1"),
+        ("--delta 1.5", "1.5"),
+        ("--parallel 0.5", "fold"),
+        ("--period 0", "the period is 0"),
+        ("--surface sphere", "--radii"),
+        ("--surface sphere --radii 1", "two numbers"),
+        ("--surface sphere --radii 1.1,1", "must be larger"),
+        ("--surface sphere --radii 1,inf", "inf"),
+        ("--surface torus --tube 0.9,1 --ring 0.5", "not smaller than the ring"),
+        ("--surface plane --periods 0,8 --height 0.5", "the first period is 0"),
+        ("--surface plane --periods 8,8 --height -1", "the height is -1"),
+        ("--surface plane --periods 8,8 --height 1 --delta 0.2", "--delta belongs to"),
+        ("--cells 1 --hot NaN --cold 2 --runs 0", "faults in the arguments"),
+        ("--surface klein-bottle", "possible values"),
+        // Three cells cannot cover the P-surface, whatever the seed.
+        ("--cells 3 --sweeps 20", "no sound partition"),
+    ] {
+        let home = tempfile::tempdir()?;
+        let ended = foam(home.path(), &format!("{arguments} --stop-after partition"))?;
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(2), "{arguments}: {said}");
+        assert!(said.contains(says), "{arguments}: {said}");
+        assert!(!said.contains("panicked"), "{arguments}: {said}");
+        assert_eq!(said.matches("error:").count(), 1, "{arguments}: {said}");
+        assert_eq!(fs::read_dir(home.path())?.count(), 0, "{arguments} left something behind");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_file_in_the_place_of_the_folder_is_kept() -> Tested {
+    let home = tempfile::tempdir()?;
+    fs::write(home.path().join("out"), "precious")?;
+    let ended = foam(home.path(), "--cells 40 --stop-after seeds")?;
+    assert_eq!(ended.status.code(), Some(2));
+    assert_eq!(fs::read_to_string(home.path().join("out"))?, "precious");
+    Ok(())
+}
