@@ -38,7 +38,7 @@ pub(super) enum StageName {
     Partition,
 }
 
-/// Make the ideal foam between two walls: seeds, partition, relaxed films.
+/// Seeds of a one-layer foam between two walls, and the partition of the gap into their cells.
 ///
 /// Without options: one period of Schwarz' P surface between the walls Φ = ±0.2, 64 cells, seed 1. Lengths are in units of
 /// the surface (of the period L where there is one).
