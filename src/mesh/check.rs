@@ -157,10 +157,13 @@ impl Links {
             return;
         }
         let bad = bad_edges(vertex, link);
-        if bad.is_empty() && !is_path_or_empty(link) {
+        if !bad.is_empty() {
+            found.defects.extend(bad.into_iter().filter(|&(end, _)| vertex < end).map(|(_, defect)| defect));
+            return;
+        }
+        if !is_path_or_empty(link) {
             found.defects.push(MeshDefect::PinchedVertex(vertex));
         }
-        found.defects.extend(bad);
         found.border.extend(path_starts(link).map(|side| BorderEdge { from: vertex, to: side[0] }));
     }
 }
@@ -193,14 +196,14 @@ fn path_starts(link: &[[VertexId; 2]]) -> impl Iterator<Item = &[VertexId; 2]> {
     link.iter().filter(|side| link.iter().all(|other| other[1] != side[0]))
 }
 
-/// The edges from `vertex` to higher ones that have more than one triangle on a side.
-fn bad_edges(vertex: VertexId, link: &[[VertexId; 2]]) -> Vec<MeshDefect> {
-    let ends: BTreeSet<VertexId> = link.iter().flatten().copied().filter(|&end| end > vertex).collect();
+/// The edges at `vertex` that have more than one triangle on a side, with their other ends.
+fn bad_edges(vertex: VertexId, link: &[[VertexId; 2]]) -> Vec<(VertexId, MeshDefect)> {
+    let ends: BTreeSet<VertexId> = link.iter().flatten().copied().collect();
     let sides = |end: VertexId| [0, 1].map(|way| link.iter().filter(|side| side[way] == end).count());
     ends.into_iter()
         .map(|end| (end, sides(end)))
         .filter(|(_, [there, back])| *there > 1 || *back > 1)
-        .map(|(end, [there, back])| MeshDefect::BadEdge(vertex, end, there, back))
+        .map(|(end, [there, back])| (end, MeshDefect::BadEdge(vertex, end, there, back)))
         .collect()
 }
 
