@@ -2,9 +2,12 @@
 pub mod complex;
 pub mod energy;
 pub mod network;
+pub mod relax;
 pub mod solve;
+pub mod topology;
 pub mod volume;
 
+pub mod checkpoint;
 pub mod domain;
 pub mod partition;
 pub mod pattern;
@@ -15,5 +18,6 @@ pub mod start;
 
 mod convert;
 mod ground;
+mod side_lines;
 
-pub use ground::gap_volume;
+pub use ground::{flat_hexagonal_energy, gap_volume};
