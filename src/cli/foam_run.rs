@@ -18,7 +18,12 @@ use crate::{
 use anyhow::anyhow;
 use indicatif::ProgressBar;
 use serde::Serialize;
-use std::{ops::ControlFlow, time::Instant};
+use std::{
+    fmt::Write as _,
+    io::{self, Write as _},
+    ops::ControlFlow,
+    time::Instant,
+};
 
 /// The name and version of a foam's `summary.json` and `run.json`.
 pub(super) const SUMMARY_SCHEMA: &str = "combwright.foam-summary/1";
@@ -78,11 +83,16 @@ pub(super) fn run(settings: &FoamSettings) -> Result<(), CliError> {
 pub(super) fn finished(folder: OutputFolder, lines: Vec<Line>) -> Result<(), CliError> {
     let target = folder.target().display().to_string();
     folder.commit()?;
-    for (name, value) in lines {
-        println!("{name:<24}{value}");
+    let mut text = String::new();
+    for (name, value) in lines.into_iter().chain([("written to", target)]) {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{name:<24}{value}");
     }
-    println!("{:<24}{target}", "written to");
-    Ok(())
+    match io::stdout().write_all(text.as_bytes()) {
+        // Whoever reads may stop reading: the files are written.
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::failure(error)),
+        _ => Ok(()),
+    }
 }
 
 /// A line of the table on stdout.
