@@ -9,7 +9,7 @@ mod strips;
 
 pub use shape::Shape;
 pub(crate) use shape::{CurvePoint, ShapePoint, curve_points};
-pub use strips::Strips;
+pub use strips::{NoExtrusion, Strips};
 
 use crate::{
     index::{Id, IndexVec},

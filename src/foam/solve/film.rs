@@ -170,7 +170,7 @@ pub(super) fn assemble(at: &At<'_>, film: &Film, layout: &FilmLayout) -> FilmSys
         inner_at += 1;
     }
     let flat = |nodes: &[DVec3]| Mat::from_fn(3 * nodes.len(), 1, |i, _| nodes[i / 3][i % 3]);
-    let pull = |nodes: &[DVec3]| map.transpose() * flat(nodes);
+    let pull = |nodes: &[DVec3]| times(map.transpose(), flat(nodes).as_ref());
     let (gradient, back, front) = (pull(&shares.lagrangian), pull(&shares.back), pull(&shares.front));
     let moved = times(shares.hessian.as_mat(), map.as_ref());
     let mut hessian = times(map.transpose(), moved.as_ref());

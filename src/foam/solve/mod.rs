@@ -64,6 +64,8 @@ pub struct Step {
     pub direction: Direction,
     /// Displacements of all nodes for the full step, before the return to the walls.
     pub displacements: Places,
+    /// The part of them that belongs to each node's own freedoms.
+    pub own_displacements: Places,
     /// The residuals before the step.
     pub residuals: Residuals,
     /// How many directions of negative curvature the constrained Hessian has, before any stiffening.
@@ -153,6 +155,7 @@ impl System {
         let motions = Motions::new(complex, places, &self.layout, &self.frames);
         let mut shift = 0.0;
         let mut unstable = None;
+        let mut stiff = false;
         for attempt in 0..SHIFTS {
             let at =
                 At { complex, places, reference, pressures, motions: &motions, frames: &self.frames, shift };
@@ -161,18 +164,28 @@ impl System {
             let extra = factored.as_ref().map_or(1, |f| f.negative.saturating_sub(self.layout.pressures));
             let stiffened = films.iter().filter(|film| film.stiffened).count();
             unstable.get_or_insert(extra + stiffened);
+            // A Hessian that is just positive gives steps as wild as one that is not: one stiffening more.
+            let sound = extra == 0 && (shift <= 0.0 || std::mem::replace(&mut stiff, true));
             if let Ok(factored) = factored
-                && extra == 0
+                && sound
             {
                 let (rhs, residuals) = self.loads(complex, &films, &now, targets);
                 let direction = self.solve(&factored, &films, &rhs)?;
                 if direction.freedoms.iter().all(|x| x.is_finite()) {
                     let displacements = self.displacements(complex, &motions, &direction);
+                    let own_displacements = self.own_displacements(complex, &motions, &direction);
                     let unstable = unstable.unwrap_or(0);
-                    return Ok(Step { direction, displacements, residuals, unstable, shift });
+                    return Ok(Step {
+                        direction,
+                        displacements,
+                        own_displacements,
+                        residuals,
+                        unstable,
+                        shift,
+                    });
                 }
             }
-            shift = FIRST_SHIFT * 10_f64.powi(attempt).sqrt();
+            shift = FIRST_SHIFT * 10_f64.powi(attempt);
         }
         Err(FactorError::Singular { unknowns: self.layout.unknowns })
     }
@@ -258,6 +271,51 @@ impl System {
         })
     }
 
+    /// The places after `fraction` of a step: bounding nodes return to their walls, and what is slaved to them follows where
+    /// they really went, so that places are one smooth function of the freedoms. `None` if a wall is not found.
+    #[must_use]
+    pub fn moved(&self, complex: &Complex, places: &Places, step: &Step, fraction: f64) -> Option<Places> {
+        let mut moved = places.clone();
+        let own = &step.own_displacements;
+        for stage in [Stage::Free, Stage::Border, Stage::Inner] {
+            for (id, node) in complex.nodes.enumerated() {
+                let masters: &[_] = match (&node.motion, stage) {
+                    (Motion::Free, Stage::Free) => &[],
+                    (Motion::Border(masters), Stage::Border) | (Motion::Inner(masters), Stage::Inner) => {
+                        masters
+                    }
+                    _ => continue,
+                };
+                let carried: DVec3 =
+                    masters.iter().map(|&(master, weight)| weight * (moved[master] - places[master])).sum();
+                // Within the tangents first: then the return to the walls is of second order and purely normal.
+                let step =
+                    motion::tangent_projection(complex, node, places[id]) * (carried + fraction * own[id]);
+                moved[id] = complex.retracted(node, places[id] + step)?;
+            }
+        }
+        Some(moved)
+    }
+
+    /// Each node's displacement by its own freedoms alone.
+    fn own_displacements(&self, complex: &Complex, motions: &Motions, direction: &Direction) -> Places {
+        let mut own: Places = complex
+            .nodes
+            .ids()
+            .map(|id| {
+                let count = self.layout.freedoms[id].1;
+                motions.columns[id][..count].iter().map(|&(freedom, d)| direction.freedoms[freedom] * d).sum()
+            })
+            .collect();
+        for (film, amounts) in self.layout.films.iter().zip(&direction.inner) {
+            for (&row, amount) in film.inner.iter().zip(amounts) {
+                let node = film.nodes[row].node;
+                own[node] = *amount * self.frames.axis(node);
+            }
+        }
+        own
+    }
+
     /// The first-order displacements of all nodes.
     fn displacements(&self, complex: &Complex, motions: &Motions, direction: &Direction) -> Places {
         let mut moved: Places = motions
@@ -277,6 +335,14 @@ impl System {
     }
 }
 
+/// The order in which nodes move: masters first.
+#[derive(Clone, Copy)]
+enum Stage {
+    Free,
+    Border,
+    Inner,
+}
+
 /// Border nodes pass the forces on them to their masters.
 fn pass_to_masters(complex: &Complex, forces: &mut Places) {
     for (id, node) in complex.nodes.enumerated() {
@@ -287,3 +353,6 @@ fn pass_to_masters(complex: &Complex, forces: &mut Places) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
