@@ -3,11 +3,7 @@
 //! An edge flips when it is shorter than a part of the cell width. Each flip of an edge lowers the part for that edge, and
 //! the new edge is laid longer than the threshold: so no edge flips back and forth for ever.
 
-use super::{
-    complex::NoExtrusion,
-    network::{EdgeId, FlipRefusal},
-    relax::State,
-};
+use super::{network::EdgeId, relax::State};
 use crate::surface::Gap;
 
 /// By how much each flip of an edge lowers its threshold.
@@ -17,7 +13,7 @@ const WEARINESS: f64 = 0.6;
 /// neighbours more.
 const NEW_LENGTH: f64 = 0.12;
 
-/// The edges that are short enough for a T1, the shortest first.
+/// The edges that are short enough for a T1 and may flip, the shortest first.
 #[must_use]
 pub fn short_edges(state: &State, part: f64) -> Vec<EdgeId> {
     let width = state.cell_width();
@@ -28,43 +24,30 @@ pub fn short_edges(state: &State, part: f64) -> Vec<EdgeId> {
             let (a, b) = state.chord(edge);
             let weary = WEARINESS.powi(i32::try_from(state.flips_of_edge[edge]).unwrap_or(i32::MAX));
             let relative = a.distance(b) / (width * part * weary);
-            (relative < 1.0).then_some((relative, edge))
+            (relative < 1.0 && state.network.can_flip(edge).is_ok()).then_some((relative, edge))
         })
         .collect();
     short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     short.into_iter().map(|(_, edge)| edge).collect()
 }
 
-/// Why a T1 was not done.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum FlipError {
-    /// The network does not allow it; nothing has changed.
-    #[error(transparent)]
-    Refused(#[from] FlipRefusal),
-    /// The new films found no foot on a wall.
-    #[error(transparent)]
-    NoExtrusion(#[from] NoExtrusion),
-}
-
 /// Does the T1 of an edge: flips the network, turns the edge by a right angle within the middle surface and lays the five
-/// films that meet it anew.
-///
-/// # Errors
-/// [`FlipError`]; the state is unchanged then.
-pub fn flip(state: &mut State, gap: &Gap, edge: EdgeId) -> Result<(), FlipError> {
+/// films that meet it anew. Gives whether it was done; otherwise only the edge's threshold has changed.
+pub fn flip(state: &mut State, gap: &Gap, edge: EdgeId) -> bool {
     let before = state.clone();
     state.follow_films();
-    let flipped = flip_in_place(state, gap, edge);
-    if flipped.is_err() {
-        *state = before;
+    if flip_in_place(state, gap, edge).is_some() {
+        return true;
     }
-    flipped
+    *state = before;
+    state.flips_of_edge[edge] += 1;
+    false
 }
 
-fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Result<(), FlipError> {
+fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Option<()> {
     let (start, end) = state.chord(edge);
     let width = state.cell_width();
-    state.network.flip(edge)?;
+    state.network.flip(edge).ok()?;
     let side = edge.half_edges()[0];
     let (u, v) = (state.network.origin(side), state.network.target(side));
     let far = state.network.period().translation(state.network.target_shift(side));
@@ -76,16 +59,16 @@ fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Result<(), FlipE
     state.network.set_position(u, middle + half * left);
     state.network.set_position(v, middle - half * left - far);
     for vertex in [u, v] {
-        state.strips.lay_column(&state.network, gap, vertex, &mut state.places)?;
+        state.strips.lay_column(&state.network, gap, vertex, &mut state.places).ok()?;
     }
     let touched: Vec<EdgeId> = [u, v]
         .into_iter()
         .flat_map(|w| state.network.outgoing(w).map(|side| side.edge()).collect::<Vec<_>>())
         .collect();
     for edge in touched {
-        state.strips.lay_film(&state.network, gap, edge, &mut state.places)?;
+        state.strips.lay_film(&state.network, gap, edge, &mut state.places).ok()?;
     }
     state.flips += 1;
     state.flips_of_edge[edge] += 1;
-    Ok(())
+    Some(())
 }
