@@ -122,3 +122,64 @@ fn a_file_in_the_place_of_the_folder_is_kept() -> Tested {
     assert_eq!(fs::read_to_string(home.path().join("out"))?, "precious");
     Ok(())
 }
+
+#[test]
+fn a_foam_of_twelve_cells_has_its_exact_energy() -> Tested {
+    let home = tempfile::tempdir()?;
+    let ended = foam(home.path(), "--surface sphere --radii 1,1.1 -n 12 --sweeps 100 --elements 4,2")?;
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let out = home.path().join("out");
+    let summary = json(&out.join("summary.json"))?;
+    // Plane films along the edges of a dodecahedron.
+    let exact = 30.0 * (5.0_f64.sqrt() / 3.0).acos() * (1.1 * 1.1 - 1.0) / 2.0;
+    let energy = summary["energy"].as_f64().ok_or("no energy")?;
+    // Fourth order in the length of an element: 4e-5 was measured with two of them along an edge, a sixteenth with four.
+    assert!((energy / exact - 1.0).abs() < 5e-6, "{energy} is not {exact}");
+    assert_eq!(summary["stop"], "converged");
+    for name in
+        ["films.vtp", "films.glb", "foam.png", "energy.svg", "energy.csv", "cells.csv", "pattern.json"]
+    {
+        assert!(fs::metadata(out.join(name))?.len() > 0, "{name} is empty");
+    }
+    assert_eq!(&fs::read(out.join("films.glb"))?[..4], b"glTF");
+    assert!(!out.join("checkpoint.json").exists());
+    Ok(())
+}
+
+#[test]
+fn the_best_of_some_runs_is_kept_whatever_the_threads() -> Tested {
+    let written = |jobs: &str| -> Result<(Vec<u8>, Value), Box<dyn Error>> {
+        let home = tempfile::tempdir()?;
+        let ended = foam(
+            home.path(),
+            &format!("--surface sphere --radii 1,1.1 -n 14 --sweeps 50 --runs 3 -j {jobs}"),
+        )?;
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        let out = home.path().join("out");
+        assert_eq!(fs::read_to_string(out.join("runs.csv"))?.lines().count(), 4);
+        Ok((fs::read(out.join("cells.csv"))?, json(&out.join("summary.json"))?))
+    };
+    assert_eq!(written("1")?, written("2")?);
+    Ok(())
+}
+
+#[test]
+fn a_checkpoint_that_is_none_is_refused() -> Tested {
+    let home = tempfile::tempdir()?;
+    for (text, says) in [
+        ("{\"schema\": \"combwright.foam-checkpoint/99\"}", "foam-checkpoint/99"),
+        ("{\"schema\": \"combwright.foam-check", "cut short"),
+        ("soap", "no checkpoint"),
+    ] {
+        let file = home.path().join("checkpoint.json");
+        fs::write(&file, text)?;
+        let ended = foam(home.path(), &format!("--resume {}", file.display()))?;
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(2), "{said}");
+        assert!(said.contains(says), "{said}");
+        assert!(!home.path().join("out").exists());
+    }
+    let ended = foam(home.path(), "--resume nowhere/checkpoint")?;
+    assert_eq!(ended.status.code(), Some(2));
+    Ok(())
+}

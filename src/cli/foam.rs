@@ -1,6 +1,7 @@
 //! `combwright foam`: the ideal foam between two walls.
 
-use super::{CliError, foam_batch, foam_run, foam_settings::FoamSettings};
+use super::{CliError, foam_batch, foam_relax, foam_run, foam_settings::FoamSettings};
+use crate::units::Mm;
 use std::path::PathBuf;
 
 /// The surface between the walls.
@@ -48,8 +49,10 @@ pub(super) enum StageName {
   combwright foam --surface sphere --radii 1.0,1.05 --cells 32
   combwright foam --surface torus --tube 0.9,1.0 --ring 5
   combwright foam --surface plane --periods 8,8 --height 0.5
+  combwright foam --recipe enclosures/paper/recipe.toml --cell-width 20mm
   combwright foam --stop-after partition --density uniform
-  combwright foam --cells 32 --runs 100 -j 2")]
+  combwright foam --cells 32 --runs 100 -j 2
+  combwright foam --resume out/checkpoint -o out")]
 pub(super) struct FoamArguments {
     /// The surface half-way between the walls
     #[arg(long, value_enum, default_value = "schwarz-p", help_heading = "Space")]
@@ -103,16 +106,16 @@ pub(super) struct FoamArguments {
     #[arg(long, value_name = "H", allow_negative_numbers = true, help_heading = "Space")]
     pub(super) height: Option<f64>,
 
-    /// The number of cells
-    #[arg(
-        short = 'n',
-        long,
-        value_name = "N",
-        default_value_t = 64,
-        allow_negative_numbers = true,
-        help_heading = "Cells"
-    )]
-    pub(super) cells: usize,
+    /// The gap of an enclosure's recipe (TOML), one whole period of it; lengths are then in mm
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["surface", "period", "delta", "parallel"], help_heading = "Space")]
+    pub(super) recipe: Option<PathBuf>,
+
+    /// The number of cells [default: 64, or as many as --cell-width says]
+    #[arg(short = 'n', long, value_name = "N", allow_negative_numbers = true, help_heading = "Cells")]
+    pub(super) cells: Option<usize>,
+    /// The width of a hexagonal cell between opposite sides, on the middle surface of the recipe: 5.3mm for worker bees
+    #[arg(long, value_name = "MM", requires = "recipe", conflicts_with = "cells", help_heading = "Cells")]
+    pub(super) cell_width: Option<Mm>,
     /// Where the random numbers start
     #[arg(long, value_name = "S", default_value_t = 1, help_heading = "Cells")]
     pub(super) seed: u64,
@@ -135,6 +138,16 @@ pub(super) struct FoamArguments {
     #[arg(long, value_name = "COUNT", default_value_t = 0, help_heading = "Cells")]
     pub(super) lloyd: usize,
 
+    /// Quadratic elements along each film and from wall to wall [default: 2,2]
+    #[arg(long, value_name = "M,K", value_delimiter = ',', help_heading = "Relaxation")]
+    pub(super) elements: Option<Vec<usize>>,
+    /// The largest force at the end, in units of tension × cell width [default: 1e-11]
+    #[arg(long, value_name = "FORCE", allow_negative_numbers = true, help_heading = "Relaxation")]
+    pub(super) tolerance: Option<f64>,
+    /// Go on from a checkpoint that an earlier run left in its folder
+    #[arg(long, value_name = "FILE", conflicts_with_all = RESUME_CONFLICTS, help_heading = "Relaxation")]
+    pub(super) resume: Option<PathBuf>,
+
     /// Stop after this step
     #[arg(long, value_enum, help_heading = "Run")]
     pub(super) stop_after: Option<StageName>,
@@ -149,13 +162,45 @@ pub(super) struct FoamArguments {
     pub(super) output: PathBuf,
 }
 
+/// What a checkpoint already says.
+const RESUME_CONFLICTS: &[&str] = &[
+    "surface",
+    "period",
+    "delta",
+    "parallel",
+    "radii",
+    "tube",
+    "ring",
+    "periods",
+    "height",
+    "cells",
+    "seed",
+    "density",
+    "sweeps",
+    "disc",
+    "hot",
+    "cold",
+    "lloyd",
+    "recipe",
+    "cell_width",
+    "elements",
+    "tolerance",
+    "stop_after",
+    "runs",
+];
+
 /// Runs the command.
 pub(super) fn foam(arguments: &FoamArguments) -> Result<(), CliError> {
     let settings = FoamSettings::from_arguments(arguments).map_err(CliError::mistake)?;
+    let resumed = arguments.resume.as_deref().map(foam_relax::read_checkpoint).transpose()?;
     let mut threads = rayon::ThreadPoolBuilder::new();
     if let Some(jobs) = settings.jobs {
         threads = threads.num_threads(jobs);
     }
     let threads = threads.build().map_err(CliError::failure)?;
-    threads.install(|| if settings.runs > 1 { foam_batch::run(&settings) } else { foam_run::run(&settings) })
+    threads.install(|| match resumed {
+        Some(checkpoint) => foam_relax::resume(*checkpoint, settings),
+        None if settings.runs > 1 => foam_batch::run(&settings),
+        None => foam_run::run(&settings),
+    })
 }

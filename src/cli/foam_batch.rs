@@ -1,7 +1,166 @@
-//! Many foams of one kind with different seeds.
+//! Many foams of one kind with different seeds: the best, and how energies and defects are distributed.
 
-use super::{CliError, foam_settings::FoamSettings};
+use super::{
+    CliError,
+    foam_relax::{Begin, Job, Keeper, Made, in_words, write_all},
+    foam_run,
+    foam_settings::FoamSettings,
+    interrupt, progress,
+};
+use crate::{
+    foam::{relax::Stop, seeds::Seeds, start::start},
+    report::{foam_chart, folder::OutputFolder},
+    surface::Gap,
+};
+use anyhow::anyhow;
+use indicatif::ProgressBar;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::{
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
 
+/// One run, as a row of `runs.csv`.
+#[derive(Clone, Debug, Serialize)]
+struct Row {
+    seed: u64,
+    energy: Option<f64>,
+    converged: bool,
+    /// Side counts in words.
+    sides: String,
+    t1_count: Option<usize>,
+    newton_steps: Option<usize>,
+    residual: Option<f64>,
+    seconds: f64,
+    ended: String,
+}
+
+/// The foam of least energy so far.
+struct Best {
+    seed: u64,
+    job: Job,
+    seeds: Seeds,
+    made: Made,
+}
+
+/// Makes all foams, writes their distribution and all files of the best.
 pub(super) fn run(settings: &FoamSettings) -> Result<(), CliError> {
-    super::foam_run::run(&settings.with_seed(settings.seeds.seed))
+    let mut folder = OutputFolder::begin(&settings.output)?;
+    let gap = settings.space.gap().map_err(CliError::mistake)?;
+    interrupt::listen();
+    let began = Instant::now();
+    let bar = progress::steps(settings.runs);
+    let best = Mutex::new(None);
+    let first = settings.seeds.seed;
+    let rows: Vec<Row> = (0..settings.runs)
+        .into_par_iter()
+        .filter(|_| interrupt::flow().is_continue())
+        .map(|run| {
+            let row = one(&settings.with_seed(first.wrapping_add(run)), &gap, &best);
+            bar.inc(1);
+            row
+        })
+        .collect();
+    bar.finish_and_clear();
+    let best = best.into_inner().unwrap_or_else(PoisonError::into_inner);
+    write_rows(&mut folder, &rows)?;
+    let energies: Vec<f64> = rows.iter().filter(|row| row.converged).filter_map(|row| row.energy).collect();
+    let Some(Best { seed, job, seeds, made }) = best else {
+        folder.commit()?;
+        let first = rows.first().map_or("interrupted before the first ended", |row| &row.ended);
+        return Err(CliError::failure(anyhow!("none of {} runs converged; the first: {first}", rows.len())));
+    };
+    let chart = foam_chart::energies(&energies).map_err(CliError::failure)?;
+    folder.write_bytes("runs.svg", chart.svg().as_bytes())?;
+    let seconds = vec![("all runs", began.elapsed().as_secs_f64())];
+    write_all(&mut folder, &job, &settings.with_seed(seed), &gap, &made, Some(&seeds), seconds)?;
+    let mean = energies.iter().sum::<f64>() / f64::from(crate::index::checked_u32(energies.len()));
+    let lines = vec![
+        ("space", job.space.to_string()),
+        ("runs", format!("{} of {} converged", energies.len(), rows.len())),
+        ("best energy", format!("{:.10} (seed {seed})", made.figures.energy)),
+        ("mean energy", format!("{mean:.10}")),
+        ("best cells by sides", foam_run::by_sides(&made.figures.side_counts)),
+        ("time", format!("{:.1} s", began.elapsed().as_secs_f64())),
+    ];
+    foam_run::finished(folder, lines)
+}
+
+/// One run; keeps it if it is the best.
+fn one(settings: &FoamSettings, gap: &Gap, best: &Mutex<Option<Best>>) -> Row {
+    let began = Instant::now();
+    let seed = settings.seeds.seed;
+    let made = make(settings, gap);
+    let seconds = began.elapsed().as_secs_f64();
+    let (job, seeds, made) = match made {
+        Ok(made) => made,
+        Err(error) => return Row::failed(seed, seconds, &error),
+    };
+    let figures = &made.figures;
+    let converged = matches!(figures.ended, Stop::Converged { .. });
+    let row = Row {
+        seed,
+        energy: Some(figures.energy),
+        converged,
+        sides: foam_run::by_sides(&figures.side_counts),
+        t1_count: Some(figures.t1_count),
+        newton_steps: Some(figures.newton_steps),
+        residual: Some(figures.residual),
+        seconds,
+        ended: in_words(figures.ended),
+    };
+    if converged {
+        let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
+        // Equal energies are told apart by the seed, so that the order in which runs end does not matter.
+        let better = best.as_ref().is_none_or(|best| {
+            let (old, new) = (best.made.figures.energy, figures.energy);
+            new.total_cmp(&old).then(seed.cmp(&best.seed)).is_lt()
+        });
+        if better {
+            *best = Some(Best { seed, job, seeds, made });
+        }
+    }
+    row
+}
+
+fn make(settings: &FoamSettings, gap: &Gap) -> Result<(Job, Seeds, Made), CliError> {
+    let domain = settings.space.domain().map_err(CliError::mistake)?;
+    let start =
+        start(gap, &domain, &settings.seeds, &mut |_| interrupt::flow()).map_err(CliError::failure)?;
+    let Some(network) = start.network else {
+        return Err(CliError::failure(anyhow!("the partition gave no network")));
+    };
+    let job = Job::new(settings, start.seeds.psi6);
+    let hidden = ProgressBar::hidden();
+    let mut keeper = Keeper::new(&job, &hidden, None, Vec::new());
+    let relaxed = keeper.relax(Begin::Network(network), gap)?;
+    let made = Made::new(&job, gap, relaxed, keeper.record)?;
+    Ok((job, start.seeds, made))
+}
+
+impl Row {
+    fn failed(seed: u64, seconds: f64, error: &CliError) -> Self {
+        Self {
+            seed,
+            energy: None,
+            converged: false,
+            sides: String::new(),
+            t1_count: None,
+            newton_steps: None,
+            residual: None,
+            seconds,
+            ended: error.to_string(),
+        }
+    }
+}
+
+fn write_rows(folder: &mut OutputFolder, rows: &[Row]) -> Result<(), CliError> {
+    Ok(folder.write("runs.csv", |writer| {
+        let mut table = csv::Writer::from_writer(writer);
+        for row in rows {
+            table.serialize(row)?;
+        }
+        table.flush()
+    })?)
 }

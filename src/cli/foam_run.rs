@@ -1,7 +1,7 @@
 //! One foam, from settings to its folder.
 
 use super::{
-    CliError,
+    CliError, foam_relax,
     foam_settings::{FoamSettings, Stage},
     interrupt, progress,
 };
@@ -18,10 +18,15 @@ use crate::{
 use anyhow::anyhow;
 use indicatif::ProgressBar;
 use serde::Serialize;
-use std::{ops::ControlFlow, time::Instant};
+use std::{
+    fmt::Write as _,
+    io::{self, Write as _},
+    ops::ControlFlow,
+    time::Instant,
+};
 
 /// The name and version of a foam's `summary.json` and `run.json`.
-const SUMMARY_SCHEMA: &str = "combwright.foam-summary/1";
+pub(super) const SUMMARY_SCHEMA: &str = "combwright.foam-summary/1";
 const RUN_SCHEMA: &str = "combwright.foam-run/1";
 
 /// Steps of the progress bar per stage.
@@ -66,20 +71,32 @@ pub(super) fn run(settings: &FoamSettings) -> Result<(), CliError> {
     let ended = match settings.last_stage {
         Stage::Seeds => seeds_only(settings, &gap, &bar, &mut folder),
         Stage::Partition => partition(settings, &gap, &bar, &mut folder),
+        Stage::Foam => {
+            return foam_relax::run(settings, &gap, &bar, folder);
+        }
     };
     bar.finish_and_clear();
-    let lines = ended?;
+    finished(folder, ended?)
+}
+
+/// Moves the files into place and prints the table.
+pub(super) fn finished(folder: OutputFolder, lines: Vec<Line>) -> Result<(), CliError> {
     let target = folder.target().display().to_string();
     folder.commit()?;
-    for (name, value) in lines {
-        println!("{name:<24}{value}");
+    let mut text = String::new();
+    for (name, value) in lines.into_iter().chain([("written to", target)]) {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{name:<24}{value}");
     }
-    println!("{:<24}{target}", "written to");
-    Ok(())
+    match io::stdout().write_all(text.as_bytes()) {
+        // Whoever reads may stop reading: the files are written.
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::failure(error)),
+        _ => Ok(()),
+    }
 }
 
 /// A line of the table on stdout.
-type Line = (&'static str, String);
+pub(super) type Line = (&'static str, String);
 
 fn seeds_only(
     settings: &FoamSettings,
@@ -175,17 +192,10 @@ fn summary(settings: &FoamSettings, start: &Start, pattern: &CellPattern, volume
 }
 
 fn table(summary: &Summary, seconds: f64) -> Vec<Line> {
-    let sides: Vec<String> = summary
-        .side_counts
-        .iter()
-        .enumerate()
-        .filter(|(_, count)| **count > 0)
-        .map(|(sides, count)| format!("{sides}: {count}"))
-        .collect();
     vec![
         ("space", summary.space.clone()),
         ("cells", summary.cells.to_string()),
-        ("cells by sides", sides.join(", ")),
+        ("cells by sides", by_sides(&summary.side_counts)),
         ("charge Σ(6−n)", summary.charge.to_string()),
         ("volume of the gap", format!("{:.12}", summary.gap_volume)),
         ("spread of volumes", format!("{:.2} %", 100.0 * summary.volume_spread)),
@@ -193,6 +203,12 @@ fn table(summary: &Summary, seconds: f64) -> Vec<Line> {
         ("draws rejected", summary.rejected_draws.to_string()),
         ("time", format!("{seconds:.2} s")),
     ]
+}
+
+/// Side counts in words: `5: 2, 6: 36`.
+pub(super) fn by_sides(counts: &[usize]) -> String {
+    let seen = counts.iter().enumerate().filter(|(_, count)| **count > 0);
+    seen.map(|(sides, count)| format!("{sides}: {count}")).collect::<Vec<_>>().join(", ")
 }
 
 /// Writes the patterns of the middle surface and of both walls; gives the first.
@@ -213,7 +229,7 @@ fn write_patterns(folder: &mut OutputFolder, start: &Start, gap: &Gap) -> Result
     Ok(middle)
 }
 
-fn write_seeds(folder: &mut OutputFolder, seeds: &Seeds) -> Result<(), CliError> {
+pub(super) fn write_seeds(folder: &mut OutputFolder, seeds: &Seeds) -> Result<(), CliError> {
     foam_files::write_seeds(folder, seeds)?;
     if !seeds.trace.is_empty() {
         let chart = foam_chart::annealing(&seeds.trace).map_err(CliError::failure)?;
@@ -222,7 +238,7 @@ fn write_seeds(folder: &mut OutputFolder, seeds: &Seeds) -> Result<(), CliError>
     Ok(())
 }
 
-fn write_run(
+pub(super) fn write_run(
     folder: &mut OutputFolder,
     settings: &FoamSettings,
     seconds: Vec<(&'static str, f64)>,

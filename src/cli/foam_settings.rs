@@ -2,11 +2,27 @@
 
 use super::foam::{DensityName, FoamArguments, StageName, SurfaceName};
 use crate::foam::{
+    complex::Strips,
+    relax::RelaxSettings,
     seeds::{Density, SeedSettings},
     setup::{FoamSpace, PeriodicSurface, PeriodicWalls},
 };
+use crate::{
+    enclosure::{Design, Recipe},
+    surface::{Gap, GapKind, SurfaceSamples},
+    units::Mm,
+};
 use serde::Serialize;
-use std::{fmt, path::PathBuf};
+use std::{
+    fmt, fs,
+    path::{Path, PathBuf},
+};
+
+/// The number of cells where none is given.
+const DEFAULT_CELLS: usize = 64;
+
+/// Lines per axis when the middle surface's area is measured: good to 1e-4.
+const AREA_LINES: usize = 40;
 
 /// The most cells of one foam. The memory of the sparse factors grows like N^1.3: beyond this no desktop holds them.
 const MOST_CELLS: usize = 20_000;
@@ -26,6 +42,7 @@ const MOST_JOBS: usize = 1024;
 pub(super) enum Stage {
     Seeds,
     Partition,
+    Foam,
 }
 
 /// What a run of `combwright foam` shall do.
@@ -33,6 +50,7 @@ pub(super) enum Stage {
 pub(super) struct FoamSettings {
     pub(super) space: FoamSpace,
     pub(super) seeds: SeedSettings,
+    pub(super) relax: RelaxSettings,
     pub(super) last_stage: Stage,
     pub(super) runs: u64,
     #[serde(skip)]
@@ -63,25 +81,36 @@ impl FoamSettings {
     /// The settings that the arguments mean.
     pub(super) fn from_arguments(arguments: &FoamArguments) -> Result<Self, Faults> {
         let mut faults = unused(arguments);
-        let space = space(arguments, &mut faults);
-        if let Err(error) = space.gap()
-            && faults.is_empty()
-        {
-            faults.push(error.to_string());
+        let space = match &arguments.recipe {
+            Some(file) => recipe_space(file).map_err(|fault| Faults(vec![fault]))?,
+            None => space(arguments, &mut faults),
+        };
+        let mut cells = arguments.cells.unwrap_or(DEFAULT_CELLS);
+        match space.gap() {
+            Ok(gap) => {
+                if let Some(width) = arguments.cell_width {
+                    cells = cells_of_width(&gap, width, &mut faults);
+                }
+            }
+            Err(error) if faults.is_empty() => faults.push(error.to_string()),
+            Err(_) => {}
         }
-        let seeds = seeds(arguments);
+        let seeds = seeds(arguments, cells);
         faults.extend(seeds.faults().iter().map(ToString::to_string));
         let last_stage = match arguments.stop_after {
             Some(StageName::Seeds) => Stage::Seeds,
-            Some(StageName::Partition) | None => Stage::Partition,
+            Some(StageName::Partition) => Stage::Partition,
+            None => Stage::Foam,
         };
-        faults.extend(too_much(arguments));
+        let relax = relax(arguments, &mut faults);
+        faults.extend(too_much(arguments, cells));
         if !faults.is_empty() {
             return Err(Faults(faults));
         }
         Ok(Self {
             space,
             seeds,
+            relax,
             last_stage,
             runs: arguments.runs,
             jobs: arguments.jobs,
@@ -95,8 +124,33 @@ impl FoamSettings {
     }
 }
 
-fn seeds(arguments: &FoamArguments) -> SeedSettings {
-    let mut seeds = SeedSettings::new(arguments.cells, arguments.seed);
+/// The most elements along a film or through it: the error falls with the fourth power of their number.
+const MOST_ELEMENTS: usize = 16;
+
+fn relax(arguments: &FoamArguments, faults: &mut Vec<String>) -> RelaxSettings {
+    let mut relax = RelaxSettings::default();
+    match arguments.elements.as_deref() {
+        None => {}
+        Some(&[along, through])
+            if (1..=MOST_ELEMENTS).contains(&along) && (1..=MOST_ELEMENTS).contains(&through) =>
+        {
+            relax.strips = Strips { along, through };
+        }
+        Some(_) => {
+            faults.push(format!("--elements takes two numbers between 1 and {MOST_ELEMENTS}, as in 2,2"))
+        }
+    }
+    if let Some(tolerance) = arguments.tolerance {
+        if !(1e-13..=1e-2).contains(&tolerance) {
+            faults.push(format!("--tolerance {tolerance} must lie between 1e-13 and 0.01"));
+        }
+        relax.tolerance = tolerance;
+    }
+    relax
+}
+
+fn seeds(arguments: &FoamArguments, cells: usize) -> SeedSettings {
+    let mut seeds = SeedSettings::new(cells, arguments.seed);
     seeds.density = match arguments.density {
         DensityName::Gap => Density::Gap,
         DensityName::Uniform => Density::Uniform,
@@ -108,6 +162,38 @@ fn seeds(arguments: &FoamArguments) -> SeedSettings {
     anneal.hot = arguments.hot.unwrap_or(anneal.hot);
     anneal.cold = arguments.cold.unwrap_or(anneal.cold);
     seeds
+}
+
+/// One period of the gap that an enclosure's recipe describes, in mm.
+fn recipe_space(file: &Path) -> Result<FoamSpace, String> {
+    let named = |error: &dyn fmt::Display| format!("{}: {error}", file.display());
+    let text = fs::read_to_string(file).map_err(|error| named(&error))?;
+    let recipe = Recipe::parse(&text).map_err(|error| named(&error))?;
+    let design = Design::new(&recipe).map_err(|error| named(&error))?;
+    let [lower, upper] = design.gap.walls();
+    let period = design.period.0;
+    let walls = match design.gap.kind() {
+        GapKind::LevelSet => PeriodicWalls::LevelSet { delta: upper.level },
+        GapKind::Parallel => PeriodicWalls::Parallel { gap: (upper.level - lower.level) * period },
+    };
+    Ok(FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period, walls })
+}
+
+/// How many hexagons of this width cover the middle surface.
+fn cells_of_width(gap: &Gap, width: Mm, faults: &mut Vec<String>) -> usize {
+    if width.0 <= 0.0 {
+        faults.push(format!("--cell-width is {width}: it must be positive"));
+        return DEFAULT_CELLS;
+    }
+    let area = SurfaceSamples::new(gap.middle().as_ref(), 0.0, AREA_LINES).area();
+    let hexagon = 0.5 * 3.0_f64.sqrt() * width.0 * width.0;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive, and too many are refused"
+    )]
+    let cells = (area / hexagon).round() as usize;
+    cells
 }
 
 /// The space that was meant; missing and malformed numbers become faults.
@@ -185,20 +271,23 @@ fn unused(arguments: &FoamArguments) -> Vec<String> {
 }
 
 /// Sizes that no machine at hand can do.
-fn too_much(arguments: &FoamArguments) -> Vec<String> {
+fn too_much(arguments: &FoamArguments, cells: usize) -> Vec<String> {
     let mut faults = Vec::new();
     let most = if arguments.stop_after.is_some() { MOST_PARTITION_CELLS } else { MOST_CELLS };
-    if arguments.cells > most {
+    if cells > most {
         faults.push(format!(
             "{} cells are too many: a foam of them would need about {} of memory and {} on two cores; the most is {most}{}",
-            arguments.cells,
-            memory(arguments.cells),
-            duration(arguments.cells),
+            cells,
+            memory(cells),
+            duration(cells),
             if arguments.stop_after.is_some() { "" } else { " (200000 with --stop-after partition)" },
         ));
     }
     if !(1..=MOST_RUNS).contains(&arguments.runs) {
         faults.push(format!("--runs {} must lie between 1 and {MOST_RUNS}", arguments.runs));
+    }
+    if arguments.runs > 1 && arguments.stop_after.is_some() {
+        faults.push("--runs keeps the foam of least energy, which is known only after relaxation: leave out --stop-after".to_owned());
     }
     if let Some(jobs) = arguments.jobs
         && !(1..=MOST_JOBS).contains(&jobs)

@@ -80,6 +80,18 @@ pub(crate) fn element_area(shape: Shape, nodes: &[DVec3]) -> f64 {
         .sum()
 }
 
+/// Whether the normals of an element differ from their mean by more than a right angle: it is turned over somewhere, and its
+/// quadrature means nothing.
+#[must_use]
+pub(crate) fn is_folded(shape: Shape, nodes: &[DVec3]) -> bool {
+    let normals = shape.points().iter().map(|point| {
+        let (_, a, b) = jet(point, nodes);
+        a.cross(b)
+    });
+    let mean: DVec3 = normals.clone().sum();
+    !normals.into_iter().all(|normal| normal.dot(mean) > 0.0)
+}
+
 /// The energy of all films: tension times area.
 #[must_use]
 pub fn energy(complex: &Complex, places: &Places) -> f64 {

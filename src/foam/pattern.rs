@@ -1,12 +1,13 @@
-//! From a partition to the pattern that is compared with comb.
+//! From a partition or a relaxed foam to the pattern that is compared with comb.
 
 use super::{
     domain::{Axis, Domain},
     partition::{Beyond, Partition, PartitionCell, Side},
+    relax::State,
 };
 use crate::{
     index::{Id, IndexVec},
-    surface::{Gap, WallSide},
+    surface::{Gap, LevelSet, WallSide},
     tessellation::{Cell, CellId, CellPattern, CellStatus, CellWall, PatternDefect, Surroundings},
 };
 use glam::DVec3;
@@ -36,6 +37,73 @@ pub fn pattern_of_partition(
     CellPattern::new("L", surroundings(gap, partition.domain()), cells)
 }
 
+/// The pattern of a relaxed foam's cells. Its neighbours are the same at every height; lengths and areas are those of the
+/// films at the place asked for. Lengths are in the surface's unit, `L`.
+///
+/// # Errors
+/// Every [`PatternDefect`] found.
+pub fn pattern_of_state(
+    state: &State,
+    gap: &Gap,
+    place: PatternPlace,
+) -> Result<CellPattern, Vec<PatternDefect>> {
+    let network = &state.network;
+    let row = match place {
+        PatternPlace::Wall(WallSide::Lower) => 0,
+        PatternPlace::Middle => state.rows() / 2,
+        PatternPlace::Wall(WallSide::Upper) => state.rows() - 1,
+    };
+    let cell = |id| {
+        let (position, surface) = placed(network.centre(id), gap, place);
+        let walls = network.ring(id).map(|side| CellWall {
+            neighbour: Some(CellId::from_index(network.neighbour(side).index())),
+            shift: network.neighbour_shift(side),
+            length: length(&state.side_line(side, row), &state.side_line(network.next(side), row)),
+        });
+        let walls: Vec<CellWall> = walls.collect();
+        Cell {
+            position,
+            normal: surface.normal(position),
+            sides: u32::try_from(walls.len()).ok(),
+            status: CellStatus::Complete,
+            confidence: 1.0,
+            area: fan_area(position, &state.outline_at(id, row)),
+            gauss_curvature: Some(surface.curvature(position).gauss),
+            walls,
+        }
+    };
+    let cells: IndexVec<CellId, Cell> = network.cells().map(cell).collect();
+    CellPattern::new(
+        "L",
+        Surroundings::Closed { euler_characteristic: network.euler_characteristic() },
+        cells,
+    )
+}
+
+/// The foot of `centre` on the surface that the pattern lies on, and that surface.
+fn placed(centre: DVec3, gap: &Gap, place: PatternPlace) -> (DVec3, &dyn LevelSet) {
+    match place {
+        PatternPlace::Middle => (gap.middle().project(centre, 0.0).unwrap_or(centre), gap.middle().as_ref()),
+        PatternPlace::Wall(side) => {
+            let wall = gap.wall(side);
+            (wall.project(centre).unwrap_or(centre), wall.field.as_ref())
+        }
+    }
+}
+
+/// The length of a line that ends where `next` starts.
+fn length(line: &[DVec3], next: &[DVec3]) -> f64 {
+    let points: Vec<DVec3> = line.iter().chain(next.first()).copied().collect();
+    points.windows(2).map(|ends| ends[0].distance(ends[1])).sum()
+}
+
+/// The area of the triangles between a centre and an outline.
+fn fan_area(centre: DVec3, outline: &[DVec3]) -> f64 {
+    let next = outline.iter().cycle().skip(1);
+    let triangle = |(&a, &b): (&DVec3, &DVec3)| (a - centre).cross(b - centre).length();
+    0.5 * outline.iter().zip(next).map(triangle).sum::<f64>()
+}
+
 fn surroundings(gap: &Gap, domain: &Domain) -> Surroundings {
     if domain.axes.iter().any(|axis| matches!(axis, Axis::Walls { .. })) {
         return Surroundings::Open;
@@ -49,13 +117,7 @@ fn pattern_cell(cell: &PartitionCell, gap: &Gap, place: PatternPlace) -> Cell {
         PatternPlace::Middle => cell.sections.first().unwrap_or(&none),
         PatternPlace::Wall(wall) => &cell.on_walls[wall as usize],
     };
-    let (surface, position) = match place {
-        PatternPlace::Middle => (gap.middle(), cell.seed),
-        PatternPlace::Wall(side) => {
-            let wall = gap.wall(side);
-            (&wall.field, wall.project(cell.seed).unwrap_or(cell.seed))
-        }
-    };
+    let (position, surface) = placed(cell.seed, gap, place);
     let walls: Vec<CellWall> = sides.iter().map(pattern_wall).collect();
     let cut = walls.iter().any(|wall| wall.neighbour.is_none());
     Cell {
@@ -64,7 +126,7 @@ fn pattern_cell(cell: &PartitionCell, gap: &Gap, place: PatternPlace) -> Cell {
         sides: (!cut).then(|| u32::try_from(walls.len()).unwrap_or(u32::MAX)),
         status: if cut { CellStatus::Cut } else { CellStatus::Complete },
         confidence: 1.0,
-        area: area(position, sides),
+        area: fan_area(position, &sides.iter().map(|side| side.start).collect::<Vec<_>>()),
         gauss_curvature: Some(surface.curvature(position).gauss),
         walls,
     }
@@ -76,13 +138,6 @@ fn pattern_wall(side: &Side) -> CellWall {
         Beyond::Plane { .. } | Beyond::Wall(_) => (None, glam::IVec3::ZERO),
     };
     CellWall { neighbour, shift, length: side.length }
-}
-
-/// The area of the triangles between a centre and the sides.
-fn area(centre: DVec3, sides: &[Side]) -> f64 {
-    let next = sides.iter().cycle().skip(1);
-    let triangle = |(side, next): (&Side, &Side)| (side.start - centre).cross(next.start - centre).length();
-    0.5 * sides.iter().zip(next).map(triangle).sum::<f64>()
 }
 
 #[cfg(test)]

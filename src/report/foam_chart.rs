@@ -4,7 +4,7 @@ use super::{
     figure::{FONT, Figure},
     palette::{BLUE, Colour, INK, ORANGE},
 };
-use crate::foam::seeds::TracePoint;
+use crate::foam::{checkpoint::StepRecord, seeds::TracePoint};
 use plotters::{chart::DualCoordChartContext, coord::ranged1d::Ranged, prelude::*};
 
 /// A chart that could not be drawn.
@@ -69,6 +69,133 @@ pub fn annealing(trace: &[TracePoint]) -> Result<Figure, ChartError> {
     }
     Ok(Figure::from_svg(svg))
 }
+
+/// The relaxation: energy and residual against Newton steps.
+///
+/// # Errors
+/// [`ChartError`] if the chart cannot be drawn.
+pub fn relaxation(record: &[StepRecord]) -> Result<Figure, ChartError> {
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let (first, last) = (record.first().map_or(0, |r| r.step), record.last().map_or(1, |r| r.step));
+        let steps = as_f64(first)..as_f64(last.max(first + 1));
+        let energies = || record.iter().map(|r| r.energy);
+        let (low, high) = (energies().fold(f64::INFINITY, f64::min), energies().fold(f64::MIN, f64::max));
+        let room = (0.05 * (high - low)).max(1e-6 * high.abs());
+        let force = |r: &StepRecord| r.force.clamp(1e-16, 1e3);
+        let mut chart = ChartBuilder::on(&root)
+            .caption("Relaxation of the films", (FONT, 22).into_font().color(&rgb(INK)))
+            .margin(14)
+            .x_label_area_size(48)
+            .y_label_area_size(84)
+            .right_y_label_area_size(74)
+            .build_cartesian_2d(steps.clone(), low - room..high + room)
+            .map_err(failed)?
+            .set_secondary_coord(steps, (1e-15..1e1).log_scale());
+        let text = || (FONT, 15).into_font().color(&rgb(INK));
+        chart
+            .configure_mesh()
+            .x_desc("Newton steps")
+            .y_desc("energy / (tension L²)")
+            .axis_desc_style(text())
+            .label_style(text())
+            .x_label_formatter(&|value| format!("{value:.0}"))
+            .y_label_formatter(&|value| format!("{value:.5}"))
+            .light_line_style(WHITE)
+            .draw()
+            .map_err(failed)?;
+        chart
+            .configure_secondary_axes()
+            .y_desc("largest force / (tension × cell width)")
+            .y_label_formatter(&|value| format!("{value:.0e}"))
+            .axis_desc_style(text())
+            .label_style(text())
+            .draw()
+            .map_err(failed)?;
+        let line = record.iter().map(|r| (as_f64(r.step), r.energy));
+        chart
+            .draw_series(LineSeries::new(line, rgb(BLUE).stroke_width(2)))
+            .map_err(failed)?
+            .label("energy")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], rgb(BLUE).stroke_width(2)));
+        let line = record.iter().map(|r| (as_f64(r.step), force(r)));
+        chart
+            .draw_secondary_series(LineSeries::new(line, rgb(ORANGE).stroke_width(2)))
+            .map_err(failed)?
+            .label("largest force")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], rgb(ORANGE).stroke_width(2)));
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .label_font(text())
+            .border_style(rgb(INK).mix(0.3))
+            .background_style(WHITE.mix(0.8))
+            .draw()
+            .map_err(failed)?;
+        root.present().map_err(failed)?;
+    }
+    Ok(Figure::from_svg(svg))
+}
+
+/// How the energies of many runs are distributed: a histogram.
+///
+/// # Errors
+/// [`ChartError`] if the chart cannot be drawn, as without any energy.
+pub fn energies(energies: &[f64]) -> Result<Figure, ChartError> {
+    let low = energies.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = energies.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !(low.is_finite() && high.is_finite()) {
+        return Err(ChartError("there are no energies".to_owned()));
+    }
+    let width = ((high - low) / f64::from(BINS)).max(1e-9 * high.abs());
+    let counts: Vec<usize> = (0..BINS)
+        .map(|bin| {
+            let (from, to) = (low + f64::from(bin) * width, low + f64::from(bin + 1) * width);
+            let last = bin + 1 == BINS;
+            energies.iter().filter(|&&energy| energy >= from && (energy < to || last)).count()
+        })
+        .collect();
+    let most = as_f64(counts.iter().copied().max().unwrap_or(1));
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let text = || (FONT, 15).into_font().color(&rgb(INK));
+        let end = low + f64::from(BINS) * width;
+        let mut chart = ChartBuilder::on(&root)
+            .caption(format!("Energies of {} foams", energies.len()), (FONT, 22).into_font().color(&rgb(INK)))
+            .margin(14)
+            .x_label_area_size(48)
+            .y_label_area_size(60)
+            .build_cartesian_2d(low - width..end + width, 0.0..1.1 * most)
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .x_desc("energy / (tension L²)")
+            .y_desc("foams")
+            .axis_desc_style(text())
+            .label_style(text())
+            .x_labels(6)
+            .x_label_formatter(&|value| format!("{value:.5}"))
+            .y_label_formatter(&|value| format!("{value:.0}"))
+            .light_line_style(WHITE)
+            .draw()
+            .map_err(failed)?;
+        let bars = (0..BINS).zip(&counts).map(|(bin, &count)| {
+            let from = low + f64::from(bin) * width;
+            Rectangle::new([(from, 0.0), (from + width, as_f64(count))], rgb(BLUE).filled())
+        });
+        chart.draw_series(bars).map_err(failed)?;
+        root.present().map_err(failed)?;
+    }
+    Ok(Figure::from_svg(svg))
+}
+
+/// Bars of the histogram.
+const BINS: u32 = 24;
 
 type Annealing<'a, 'b, X, Y> = DualCoordChartContext<
     'a,

@@ -3,6 +3,7 @@
 use super::folder::{OutputError, OutputFolder};
 use crate::{
     foam::{
+        checkpoint::StepRecord,
         partition::{Beyond, CellMesh, Partition},
         seeds::Seeds,
     },
@@ -79,6 +80,20 @@ pub fn write_seeds(folder: &mut OutputFolder, seeds: &Seeds) -> Result<(), Outpu
         let mut table = csv::Writer::from_writer(writer);
         for record in &seeds.trace {
             table.serialize(record)?;
+        }
+        table.flush()
+    })
+}
+
+/// Writes `energy.csv`, the record of the relaxation.
+///
+/// # Errors
+/// [`OutputError`] if the file cannot be written.
+pub fn write_steps(folder: &mut OutputFolder, record: &[StepRecord]) -> Result<(), OutputError> {
+    folder.write("energy.csv", |writer| {
+        let mut table = csv::Writer::from_writer(writer);
+        for step in record {
+            table.serialize(step)?;
         }
         table.flush()
     })

@@ -5,11 +5,13 @@
 
 use super::{
     figure::{Anchor, Drawing, Figure, FigureError},
+    foam_surface::{CellFigures, Piece, PieceKind},
     palette::{self, Colour, INK},
     render::{Camera, Canvas, Corner},
 };
 use crate::{
     foam::partition::{Beyond, CellFace, Partition},
+    index::Id,
     surface::{Gap, WallSide},
 };
 use glam::{DVec2, DVec3};
@@ -29,6 +31,13 @@ pub struct DrawnCell {
     pub films: Vec<[Corner; 3]>,
     /// The edge of its floor, in order.
     pub edge: Vec<DVec3>,
+}
+
+impl DrawnCell {
+    fn empty(sides: Option<u32>) -> Self {
+        let (floor, films, edge) = (Vec::new(), Vec::new(), Vec::new());
+        Self { sides, middle: DVec3::ZERO, normal: DVec3::Z, floor, films, edge }
+    }
 }
 
 /// What is drawn, and from where.
@@ -72,14 +81,9 @@ impl FoamScene {
             let cut = cell.faces.iter().any(|face| matches!(face.beyond, Beyond::Plane { .. }));
             let sides = u32::try_from(cell.sections.first().map_or(0, Vec::len)).ok();
             let middle = floor.project(cell.seed).unwrap_or(cell.seed);
-            let mut drawn = DrawnCell {
-                sides: sides.filter(|_| !cut),
-                middle,
-                normal: normal(middle),
-                floor: Vec::new(),
-                films: Vec::new(),
-                edge: Vec::new(),
-            };
+            let mut drawn = DrawnCell::empty(sides.filter(|_| !cut));
+            drawn.middle = middle;
+            drawn.normal = normal(middle);
             let on_floor = |face: &&CellFace| face.beyond == Beyond::Wall(WallSide::Lower);
             drawn.edge.extend(cell.faces.iter().find(on_floor).into_iter().flat_map(|face| &face.outline));
             for (beyond, corners) in &mesh.loops {
@@ -98,6 +102,35 @@ impl FoamScene {
             drawn
         });
         Self { cells: cells.collect(), towards_eye: towards_eye(gap), title }
+    }
+
+    /// The scene of a relaxed foam.
+    #[must_use]
+    pub fn of_foam(pieces: &[Piece], figures: &CellFigures, gap: &Gap, title: String) -> Self {
+        let floor = gap.wall(WallSide::Lower);
+        let normal = |point: DVec3| floor.field.gradient(point).normalize_or(DVec3::Z);
+        let mut cells: Vec<DrawnCell> =
+            figures.sides.iter().map(|&sides| DrawnCell::empty(Some(sides))).collect();
+        for piece in pieces {
+            let drawn = &mut cells[piece.cell.index()];
+            let polygons = piece.polygons.iter().map(|polygon| -> Vec<DVec3> {
+                polygon.iter().map(|&corner| piece.points[corner]).collect()
+            });
+            match piece.kind {
+                PieceKind::Film { .. } => drawn.films.extend(polygons.flat_map(|points| {
+                    let flat = (points[2] - points[0]).cross(points[3] - points[1]).normalize_or_zero();
+                    fan(&points, |_| flat)
+                })),
+                PieceKind::Wall(WallSide::Lower) => {
+                    drawn.floor.extend(polygons.flat_map(|points| fan(&points, normal)));
+                    drawn.middle = piece.points.last().copied().unwrap_or_default();
+                    drawn.normal = normal(drawn.middle);
+                    drawn.edge.extend(&piece.points[..piece.outline]);
+                }
+                PieceKind::Wall(WallSide::Upper) => {}
+            }
+        }
+        Self { cells, towards_eye: towards_eye(gap), title }
     }
 
     /// The picture with its legend.

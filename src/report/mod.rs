@@ -9,7 +9,8 @@
 //! | shaded triangles in a picture | `render.rs` |
 //! | colours that colour-blind readers tell apart | `palette.rs` |
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
-//! | the foam's picture, charts, tables and meshes | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
+//! | a relaxed foam as polygons, and for ParaView and viewers | `foam_surface.rs`, `foam_export.rs` |
+//! | the foam's picture, charts and tables; a partition's cells | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
 
 pub mod comb;
@@ -19,8 +20,10 @@ pub mod enclosure_drawing;
 pub mod enclosure_section;
 pub mod figure;
 pub mod foam_chart;
+pub mod foam_export;
 pub mod foam_files;
 pub mod foam_picture;
+pub mod foam_surface;
 pub mod folder;
 pub mod palette;
 pub mod render;

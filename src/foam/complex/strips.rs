@@ -110,13 +110,24 @@ impl Strips {
         ])
     }
 
+    /// Inner nodes keep their place between the borders and between the walls (a Coons patch of the motions at the film's
+    /// four sides). Following the borders alone, a film that slides along a curved wall would leave its own middle behind.
     fn inner_motion(self, network: &Network, edge: EdgeId, column: usize, row: usize) -> Motion {
-        let last = self.columns() - 1;
-        let part = real(column) / real(last);
-        Motion::Inner(vec![
-            (self.film_node(network, edge, 0, row).node, 1.0 - part),
-            (self.film_node(network, edge, last, row).node, part),
-        ])
+        let (last, top) = (self.columns() - 1, self.rows() - 1);
+        let (u, v) = (real(column) / real(last), real(row) / real(top));
+        let node = |column, row| self.film_node(network, edge, column, row).node;
+        let mut masters = vec![(node(0, row), 1.0 - u), (node(last, row), u)];
+        if row != 0 && row != top {
+            masters.extend([
+                (node(column, 0), 1.0 - v),
+                (node(column, top), v),
+                (node(0, 0), -(1.0 - u) * (1.0 - v)),
+                (node(last, 0), -u * (1.0 - v)),
+                (node(0, top), -(1.0 - u) * v),
+                (node(last, top), -u * v),
+            ]);
+        }
+        Motion::Inner(masters)
     }
 
     fn film(self, network: &Network, edge: EdgeId) -> Film {

@@ -1,0 +1,392 @@
+//! A foam relaxed: from a start or a checkpoint to its folder.
+
+use super::{
+    CliError,
+    foam_run::{self, Line},
+    foam_settings::FoamSettings,
+    interrupt,
+};
+use crate::{
+    foam::{
+        checkpoint::{Checkpoint, StepRecord},
+        energy::energy,
+        flat_hexagonal_energy,
+        network::Network,
+        pattern::{PatternPlace, pattern_of_state},
+        relax::{self, Progress, RelaxSettings, Relaxed, State, Stop},
+        seeds::{SeedSettings, Seeds},
+        setup::FoamSpace,
+        volume::{Reference, volumes},
+    },
+    report::{
+        foam_chart, foam_export, foam_files,
+        foam_picture::FoamScene,
+        foam_surface::{CellFigures, pieces},
+        folder::{OutputFolder, write_whole},
+    },
+    surface::{Gap, WallSide},
+    tessellation::CellPattern,
+};
+use anyhow::anyhow;
+use indicatif::ProgressBar;
+use serde::Serialize;
+use std::{
+    fs, io,
+    io::Write,
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+/// The name of the checkpoint in the folder of results.
+const CHECKPOINT: &str = "checkpoint.json";
+
+/// The time from one checkpoint to the next: short against the work that would be lost, long against writing one.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(20);
+
+/// What is relaxed, and where it came from.
+pub(super) struct Job {
+    pub(super) space: FoamSpace,
+    pub(super) seeds: SeedSettings,
+    pub(super) relax: RelaxSettings,
+    pub(super) psi6: f64,
+}
+
+/// A foam as far as it came.
+pub(super) struct Made {
+    pub(super) relaxed: Relaxed,
+    pub(super) record: Vec<StepRecord>,
+    pub(super) figures: Figures,
+    pattern: CellPattern,
+    cells: CellFigures,
+}
+
+/// The figures of a foam: `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Figures {
+    schema: &'static str,
+    pub(super) cells: usize,
+    space: String,
+    /// Films' area times their tension, 1.
+    pub(super) energy: f64,
+    /// That of the flat hexagonal foam of the same cells.
+    flat_hexagonal_energy: f64,
+    energy_over_flat: f64,
+    /// How many cells have 0, 1, 2 … sides.
+    pub(super) side_counts: Vec<usize>,
+    /// Σ (6 − n).
+    charge: i64,
+    gap_volume: f64,
+    /// The largest relative deviation of a cell's volume from its target.
+    volume_error: f64,
+    /// Pressures relative to their mean.
+    pressure_min: f64,
+    pressure_max: f64,
+    /// T1s on the way.
+    pub(super) t1_count: usize,
+    pub(super) newton_steps: usize,
+    /// The largest force left, in units of tension × cell width.
+    pub(super) residual: f64,
+    /// Directions of negative curvature: 0 at a minimum.
+    pub(super) unstable_directions: usize,
+    psi6_of_seeds: f64,
+    #[serde(flatten)]
+    pub(super) ended: Stop,
+}
+
+/// A checkpoint from a file, checked.
+pub(super) fn read_checkpoint(path: &Path) -> Result<Box<Checkpoint>, CliError> {
+    let file = match path {
+        folder if folder.is_dir() => folder.join(CHECKPOINT),
+        file if file.exists() => file.to_path_buf(),
+        stem => stem.with_extension("json"),
+    };
+    let named = |error: anyhow::Error| CliError::mistake(error.context(format!("{}", file.display())));
+    let bytes = fs::read(&file).map_err(|error| named(anyhow!("cannot be read: {error}")))?;
+    Ok(Box::new(Checkpoint::read(&bytes).map_err(|error| named(error.into()))?))
+}
+
+/// Seeds, partition, relaxation, files.
+pub(super) fn run(
+    settings: &FoamSettings,
+    gap: &Gap,
+    bar: &ProgressBar,
+    mut folder: OutputFolder,
+) -> Result<(), CliError> {
+    let began = Instant::now();
+    let start = foam_run::started(settings, gap, bar)?;
+    let until_partition = began.elapsed().as_secs_f64();
+    let Some(network) = start.network else {
+        return Err(CliError::failure(anyhow!("the partition gave no network")));
+    };
+    let job = Job::new(settings, start.seeds.psi6);
+    let mut keeper = Keeper::new(&job, bar, Some(folder.target().join(CHECKPOINT)), Vec::new());
+    let relaxed = keeper.relax(Begin::Network(network), gap)?;
+    let seconds = vec![
+        ("seeds and partition", until_partition),
+        ("relaxation", began.elapsed().as_secs_f64() - until_partition),
+    ];
+    let made = Made::new(&job, gap, relaxed, keeper.record)?;
+    write_all(&mut folder, &job, settings, gap, &made, Some(&start.seeds), seconds)?;
+    bar.finish_and_clear();
+    end(folder, &job, &made)
+}
+
+/// Goes on from a checkpoint.
+pub(super) fn resume(checkpoint: Checkpoint, mut settings: FoamSettings) -> Result<(), CliError> {
+    let mut folder = OutputFolder::begin(&settings.output)?;
+    let Checkpoint { space, seeds, relax, psi6, record, state, .. } = checkpoint;
+    let job = Job { space, seeds, relax, psi6 };
+    settings.space = space;
+    settings.seeds = seeds;
+    settings.relax = job.relax.clone();
+    let gap = space.gap().map_err(CliError::mistake)?;
+    interrupt::listen();
+    let bar = super::progress::steps(1000);
+    let began = Instant::now();
+    let mut keeper = Keeper::new(&job, &bar, Some(folder.target().join(CHECKPOINT)), record);
+    let relaxed = keeper.relax(Begin::State(state), &gap)?;
+    let seconds = vec![("relaxation, resumed", began.elapsed().as_secs_f64())];
+    let made = Made::new(&job, &gap, relaxed, keeper.record)?;
+    write_all(&mut folder, &job, &settings, &gap, &made, None, seconds)?;
+    bar.finish_and_clear();
+    end(folder, &job, &made)
+}
+
+impl Job {
+    pub(super) fn new(settings: &FoamSettings, psi6: f64) -> Self {
+        Self { space: settings.space, seeds: settings.seeds, relax: settings.relax.clone(), psi6 }
+    }
+}
+
+/// Where a relaxation begins.
+pub(super) enum Begin {
+    Network(Network),
+    State(State),
+}
+
+/// Watches a relaxation: progress bar, record, checkpoints, Ctrl-C.
+pub(super) struct Keeper<'a> {
+    job: &'a Job,
+    bar: &'a ProgressBar,
+    checkpoint: Option<PathBuf>,
+    pub(super) record: Vec<StepRecord>,
+    saved: Instant,
+    failed: Option<CliError>,
+}
+
+impl<'a> Keeper<'a> {
+    pub(super) fn new(
+        job: &'a Job,
+        bar: &'a ProgressBar,
+        checkpoint: Option<PathBuf>,
+        record: Vec<StepRecord>,
+    ) -> Self {
+        Self { job, bar, checkpoint, record, saved: Instant::now(), failed: None }
+    }
+
+    /// Relaxes; a checkpoint that cannot be written ends it.
+    pub(super) fn relax(&mut self, begin: Begin, gap: &Gap) -> Result<Relaxed, CliError> {
+        let settings = &self.job.relax;
+        let relaxed = match begin {
+            Begin::Network(network) => {
+                relax::relax(network, gap, settings, &mut |progress| self.watch(progress))
+            }
+            Begin::State(state) => relax::resume(state, gap, settings, &mut |progress| self.watch(progress)),
+        };
+        match self.failed.take() {
+            Some(error) => Err(error),
+            None => relaxed.map_err(CliError::failure),
+        }
+    }
+
+    fn watch(&mut self, progress: &Progress<'_>) -> ControlFlow<()> {
+        self.record.push(StepRecord {
+            step: progress.state.steps,
+            energy: progress.energy,
+            force: progress.residuals.force,
+            volume: progress.residuals.volume,
+            fraction: progress.fraction,
+            unstable: progress.unstable,
+            flips: progress.state.flips,
+        });
+        self.bar.set_message(format!(
+            "relaxing: step {}, energy {:.8}, force {:.1e}, {} T1s",
+            progress.state.steps, progress.energy, progress.residuals.force, progress.state.flips
+        ));
+        let flow = interrupt::flow();
+        let due = flow.is_break() || self.saved.elapsed() > CHECKPOINT_INTERVAL;
+        if due && let Some(path) = &self.checkpoint {
+            self.saved = Instant::now();
+            if let Err(error) = save(path, self.job, &self.record, progress.state) {
+                self.failed = Some(error);
+                return ControlFlow::Break(());
+            }
+        }
+        flow
+    }
+}
+
+fn save(path: &Path, job: &Job, record: &[StepRecord], state: &State) -> Result<(), CliError> {
+    if let Some(parent) = path.parent() {
+        let failed = |error| crate::report::folder::OutputError::new("make the folder", parent, error);
+        fs::create_dir_all(parent).map_err(failed)?;
+    }
+    let Job { space, seeds, relax, psi6 } = job;
+    let checkpoint = Checkpoint::new(*space, *seeds, relax.clone(), *psi6, record.to_vec(), state.clone());
+    let write = |writer: &mut io::BufWriter<&mut fs::File>| {
+        serde_json::to_writer(&mut *writer, &checkpoint)?;
+        writer.write_all(b"\n")
+    };
+    Ok(write_whole(path, write)?)
+}
+
+impl Made {
+    pub(super) fn new(
+        job: &Job,
+        gap: &Gap,
+        relaxed: Relaxed,
+        record: Vec<StepRecord>,
+    ) -> Result<Self, CliError> {
+        let state = &relaxed.state;
+        let complex = state.strips.complex(&state.network, gap);
+        let reference = Reference::new(&complex, &state.places);
+        let volumes = volumes(&complex, &state.places, &reference).into_vec();
+        let pattern = pattern_of_state(state, gap, PatternPlace::Middle).map_err(no_pattern)?;
+        let mean = state.pressures.iter().sum::<f64>() / real(state.pressures.len());
+        let cells = CellFigures {
+            sides: pattern.cells.iter().map(|cell| cell.sides.unwrap_or(0)).collect(),
+            pressures: state.pressures.iter().map(|pressure| pressure - mean).collect(),
+            gauss_curvature: pattern
+                .cells
+                .iter()
+                .map(|cell| cell.gauss_curvature.unwrap_or(f64::NAN))
+                .collect(),
+            volumes,
+        };
+        let total: f64 = cells.volumes.iter().sum();
+        let energy = energy(&complex, &state.places);
+        let domain = job.space.domain().map_err(CliError::mistake)?;
+        let flat = flat_hexagonal_energy(gap, &domain, cells.volumes.len());
+        let error = |(volume, share): (&f64, &f64)| (volume / (share * total) - 1.0).abs();
+        let figures = Figures {
+            schema: foam_run::SUMMARY_SCHEMA,
+            cells: cells.volumes.len(),
+            space: job.space.to_string(),
+            energy,
+            flat_hexagonal_energy: flat,
+            energy_over_flat: energy / flat,
+            side_counts: pattern.side_counts(),
+            charge: pattern.charge(),
+            gap_volume: total,
+            volume_error: cells.volumes.iter().zip(&state.shares).map(error).fold(0.0, f64::max),
+            pressure_min: cells.pressures.iter().copied().fold(f64::INFINITY, f64::min),
+            pressure_max: cells.pressures.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            t1_count: state.flips,
+            newton_steps: state.steps,
+            residual: relaxed.residuals.force,
+            unstable_directions: relaxed.unstable,
+            psi6_of_seeds: job.psi6,
+            ended: relaxed.stop,
+        };
+        Ok(Self { relaxed, record, figures, pattern, cells })
+    }
+}
+
+fn no_pattern(defects: Vec<crate::tessellation::PatternDefect>) -> CliError {
+    let first = defects.first().map(ToString::to_string).unwrap_or_default();
+    CliError::failure(anyhow!("the foam gave no pattern: {} defects, such as: {first}", defects.len()))
+}
+
+fn real(count: usize) -> f64 {
+    f64::from(crate::index::checked_u32(count))
+}
+
+/// Writes every file of a foam.
+pub(super) fn write_all(
+    folder: &mut OutputFolder,
+    job: &Job,
+    settings: &FoamSettings,
+    gap: &Gap,
+    made: &Made,
+    seeds: Option<&Seeds>,
+    seconds: Vec<(&'static str, f64)>,
+) -> Result<(), CliError> {
+    let state = &made.relaxed.state;
+    folder.write_json("pattern.json", &made.pattern)?;
+    for (name, wall) in
+        [("pattern-lower-wall.json", WallSide::Lower), ("pattern-upper-wall.json", WallSide::Upper)]
+    {
+        let pattern = pattern_of_state(state, gap, PatternPlace::Wall(wall)).map_err(no_pattern)?;
+        folder.write_json(name, &pattern)?;
+    }
+    foam_files::write_cells(folder, &made.pattern, &made.cells.volumes, Some(&made.cells.pressures))?;
+    let surface = pieces(state, gap);
+    folder.write("films.vtp", |writer| foam_export::write_vtp(writer, &surface, &made.cells))?;
+    folder.write("films.glb", |writer| foam_export::write_glb(writer, &surface, &made.cells))?;
+    let title = format!("{}, N = {}: relaxed foam", job.space, made.figures.cells);
+    FoamScene::of_foam(&surface, &made.cells, gap, title).draw()?.write_png(folder, "foam", 1.0)?;
+    if !made.record.is_empty() {
+        let chart = foam_chart::relaxation(&made.record).map_err(CliError::failure)?;
+        folder.write_bytes("energy.svg", chart.svg().as_bytes())?;
+        foam_files::write_steps(folder, &made.record)?;
+    }
+    if let Some(seeds) = seeds {
+        foam_run::write_seeds(folder, seeds)?;
+    }
+    folder.write_json("summary.json", &made.figures)?;
+    foam_run::write_run(folder, settings, seconds, &in_words(made.figures.ended))
+}
+
+/// How a relaxation ended, for people.
+pub(super) fn in_words(stop: Stop) -> String {
+    match stop {
+        Stop::Converged { steps } => format!("converged in {steps} steps"),
+        Stop::StepLimit { residual } => {
+            format!("not converged: the steps ran out at a force of {residual:.1e}")
+        }
+        Stop::Stalled { steps, residual } => {
+            format!("not converged: stalled after {steps} steps at a force of {residual:.1e}")
+        }
+        Stop::Interrupted { steps } => format!("interrupted after {steps} steps"),
+    }
+}
+
+/// Moves the files into place, prints the table, and tells a foam that is not converged from one that is.
+fn end(folder: OutputFolder, job: &Job, made: &Made) -> Result<(), CliError> {
+    let checkpoint = folder.target().join(CHECKPOINT);
+    match made.figures.ended {
+        Stop::Converged { .. } => {
+            foam_run::finished(folder, table(&made.figures))?;
+            // What it could go on from is done.
+            match fs::remove_file(&checkpoint) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => Err(CliError::failure(error)),
+                _ => Ok(()),
+            }
+        }
+        stop => {
+            save(&checkpoint, job, &made.record, &made.relaxed.state)?;
+            foam_run::finished(folder, table(&made.figures))?;
+            let resume = format!("go on with: combwright foam --resume {}", checkpoint.display());
+            Err(CliError::failure(anyhow!("the foam is {}; {resume}", in_words(stop))))
+        }
+    }
+}
+
+fn table(figures: &Figures) -> Vec<Line> {
+    vec![
+        ("space", figures.space.clone()),
+        ("cells", figures.cells.to_string()),
+        ("ended", in_words(figures.ended)),
+        ("energy", format!("{:.10}", figures.energy)),
+        ("over flat foam", format!("{:.6}", figures.energy_over_flat)),
+        ("cells by sides", foam_run::by_sides(&figures.side_counts)),
+        ("charge Σ(6−n)", figures.charge.to_string()),
+        ("pressures", format!("{:.4} to {:.4}, mean 0", figures.pressure_min, figures.pressure_max)),
+        ("volume of the gap", format!("{:.12}", figures.gap_volume)),
+        ("volume error", format!("{:.1e}", figures.volume_error)),
+        ("T1s", figures.t1_count.to_string()),
+        ("residual", format!("{:.1e}", figures.residual)),
+        ("unstable directions", figures.unstable_directions.to_string()),
+    ]
+}

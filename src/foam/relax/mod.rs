@@ -1,0 +1,378 @@
+//! From a network to the relaxed foam.
+//!
+//! Newton steps on a coarse mesh, damped so that no film turns over, with T1s wherever a film has shrunk; then the final mesh
+//! and Newton steps to the end. Between steps nodes are spread evenly along the films and the wall patches integrated anew.
+//! How it ended is data ([`Stop`]); a run that cannot go on gives back the last good state.
+
+mod descend;
+mod state;
+
+pub use descend::{Descended, Descent, DescentSettings, DescentStep, Ending};
+pub use state::{STATE_SCHEMA, State};
+
+use super::{
+    complex::{NoExtrusion, Strips},
+    network::{CellId, Network},
+    solve::{FactorError, Residuals},
+    topology,
+};
+use crate::{index::IndexVec, surface::Gap};
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+/// What can be set about a relaxation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RelaxSettings {
+    /// The mesh of the result.
+    pub strips: Strips,
+    /// Ends when the largest force on a freedom is below this, in units of tension × cell width.
+    pub tolerance: f64,
+    /// The largest volume error allowed at the end, relative to the mean cell volume.
+    pub volume_tolerance: f64,
+    /// The most Newton steps.
+    pub step_limit: usize,
+    /// A film flips when its edge is shorter than this part of the cell width. Above 0.1 sound short edges flip; below 0.02
+    /// Newton steps on the sliver are slow.
+    pub flip_below: f64,
+    /// Each cell's share of the gap's volume; equal ones if none are given.
+    pub shares: Option<Vec<f64>>,
+}
+
+impl Default for RelaxSettings {
+    fn default() -> Self {
+        Self {
+            strips: Strips { along: 2, through: 2 },
+            tolerance: 1e-10,
+            volume_tolerance: 1e-11,
+            step_limit: 400,
+            flip_below: 0.05,
+            shares: None,
+        }
+    }
+}
+
+/// How a relaxation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "stop")]
+pub enum Stop {
+    /// Residual and volumes are below their tolerances.
+    Converged {
+        /// Newton steps taken.
+        steps: usize,
+    },
+    /// The step limit was reached.
+    StepLimit {
+        /// The residual then.
+        residual: f64,
+    },
+    /// Steps no longer reduce the residual.
+    Stalled {
+        /// Newton steps taken.
+        steps: usize,
+        /// The residual then.
+        residual: f64,
+    },
+    /// The caller asked to stop.
+    Interrupted {
+        /// Newton steps taken.
+        steps: usize,
+    },
+}
+
+/// What is told after each Newton step.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress<'a> {
+    /// The state after the step, good to go on from.
+    pub state: &'a State,
+    /// Its energy.
+    pub energy: f64,
+    /// The residuals before the step, force in units of tension × cell width, volume relative to the mean cell volume.
+    pub residuals: Residuals,
+    /// The part of the full Newton step that was taken.
+    pub fraction: f64,
+    /// Directions of negative curvature before the step.
+    pub unstable: usize,
+}
+
+/// A relaxed foam, or how far it came.
+#[derive(Clone, Debug)]
+pub struct Relaxed {
+    /// The last good state.
+    pub state: State,
+    /// How it ended.
+    pub stop: Stop,
+    /// The residuals, as in [`Progress`].
+    pub residuals: Residuals,
+    /// Directions of negative curvature at the end: 0 at a minimum.
+    pub unstable: usize,
+}
+
+/// A relaxation that could not even start.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RelaxError {
+    /// No films.
+    #[error(transparent)]
+    NoExtrusion(#[from] NoExtrusion),
+    /// No memory, or a hopeless start.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+    /// Shares that are not one positive number per cell.
+    #[error(
+        "{given} volume shares were given for {cells} cells, the smallest {least}: one positive number per cell is needed"
+    )]
+    Shares {
+        /// How many were given.
+        given: usize,
+        /// How many cells there are.
+        cells: usize,
+        /// The smallest.
+        least: f64,
+    },
+}
+
+/// Relaxes the foam that `network` starts in `gap`.
+///
+/// # Errors
+/// [`RelaxError`] if it cannot start; how a started one ended is in [`Relaxed::stop`].
+pub fn relax(
+    network: Network,
+    gap: &Gap,
+    settings: &RelaxSettings,
+    progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Relaxed, RelaxError> {
+    let shares = shares(&network, settings.shares.as_deref())?;
+    let coarse = Strips { along: 2, through: 1 };
+    let state = State::new(network, gap, coarse, shares)?;
+    resume(state, gap, settings, progress)
+}
+
+fn shares(network: &Network, given: Option<&[f64]>) -> Result<IndexVec<CellId, f64>, RelaxError> {
+    let cells = network.cells().len();
+    let Some(given) = given else {
+        return Ok(IndexVec::from_elem(1.0 / real(cells), cells));
+    };
+    let least = given
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, |a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.min(b) });
+    if given.len() != cells || least.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+        return Err(RelaxError::Shares { given: given.len(), cells, least });
+    }
+    let total: f64 = given.iter().sum();
+    Ok(given.iter().map(|share| share / total).collect::<Vec<_>>().into())
+}
+
+fn real(count: usize) -> f64 {
+    f64::from(crate::index::checked_u32(count))
+}
+
+/// Goes on from a state.
+///
+/// # Errors
+/// As [`relax`].
+pub fn resume(
+    state: State,
+    gap: &Gap,
+    settings: &RelaxSettings,
+    progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Relaxed, RelaxError> {
+    let mut run = Run::new(state, gap, settings)?;
+    // The coarse mesh need not converge further than T1s can still happen.
+    let stop = run.newton(COARSE_TOLERANCE, progress)?;
+    let stop = match stop {
+        Some(stop) => stop,
+        None => run.finish(progress)?,
+    };
+    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable })
+}
+
+/// The residual at which the mesh is refined: T1s have ended there, and two more steps would converge the coarse mesh.
+const COARSE_TOLERANCE: f64 = 1e-4;
+/// The residual between two spreadings of the nodes: the next one disturbs the balance by more.
+const SPREAD_TOLERANCE: f64 = 1e-5;
+/// Spreading nodes and converging again, at most so often: each time the nodes move a tenth as far.
+const SPREADINGS: usize = 5;
+/// Nodes that move less than this part of the cell width need not be spread again.
+const EVEN_ENOUGH: f64 = 1e-6;
+
+struct Run<'a> {
+    gap: &'a Gap,
+    settings: &'a RelaxSettings,
+    state: State,
+    descent: Descent,
+    residuals: Residuals,
+    unstable: usize,
+}
+
+/// Why Newton steps were halted.
+enum Halt {
+    Flip,
+    Interrupt,
+}
+
+impl<'a> Run<'a> {
+    fn new(state: State, gap: &'a Gap, settings: &'a RelaxSettings) -> Result<Self, RelaxError> {
+        let descent = state.descent(gap)?;
+        let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
+        Ok(Self { gap, settings, state, descent, residuals, unstable: 0 })
+    }
+
+    /// Newton steps with T1s until the residual is below `tolerance`; `None` then, otherwise why it stopped.
+    fn newton(
+        &mut self,
+        tolerance: f64,
+        progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+    ) -> Result<Option<Stop>, RelaxError> {
+        loop {
+            let settings = DescentSettings {
+                length: self.state.cell_width(),
+                tolerance,
+                volume_tolerance: tolerance.max(self.settings.volume_tolerance),
+                step_limit: self.settings.step_limit.saturating_sub(self.state.steps),
+            };
+            let flip_below = self.settings.flip_below;
+            let Self { state, descent, .. } = self;
+            let mut halt = None;
+            let descended = descent.descend(&settings, &mut |told| {
+                state.follow(told.descent);
+                let told = Progress {
+                    state,
+                    energy: told.descent.energy(),
+                    residuals: told.residuals,
+                    fraction: told.fraction,
+                    unstable: told.unstable,
+                };
+                if progress(&told).is_break() {
+                    halt = Some(Halt::Interrupt);
+                } else if !topology::short_edges(state, flip_below).is_empty() {
+                    halt = Some(Halt::Flip);
+                }
+                if halt.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            let steps = self.state.steps;
+            let Ok(descended) = descended else {
+                return Ok(Some(Stop::Stalled { steps, residual: self.residuals.force }));
+            };
+            (self.residuals, self.unstable) = (descended.residuals, descended.unstable);
+            let residual = self.residuals.force;
+            match (descended.ending, halt) {
+                (Ending::Converged, _) => return Ok(None),
+                (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
+                (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
+                (Ending::Halted, Some(Halt::Flip)) => self.flip_short()?,
+                (Ending::Halted, _) => return Ok(Some(Stop::Interrupted { steps })),
+            }
+        }
+    }
+
+    /// Flips the edges that are short enough.
+    fn flip_short(&mut self) -> Result<(), RelaxError> {
+        // An earlier flip may have lengthened the next edge or made its flip impossible.
+        while let Some(&edge) = topology::short_edges(&self.state, self.settings.flip_below).first() {
+            topology::flip(&mut self.state, self.gap, edge);
+        }
+        self.descent = self.state.descent(self.gap)?;
+        Ok(())
+    }
+
+    /// The final mesh: refined, spread evenly, converged.
+    fn finish(
+        &mut self,
+        progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+    ) -> Result<Stop, RelaxError> {
+        if self.state.strips != self.settings.strips {
+            self.state.refine(self.settings.strips);
+            self.descent = self.state.descent(self.gap)?;
+        }
+        let mut last = false;
+        for round in 1..=SPREADINGS {
+            let mut places = self.state.places.clone();
+            let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
+            if self.descent.complex().retract(&mut places).is_ok() {
+                self.descent.set_places(places);
+            }
+            last |= moved <= EVEN_ENOUGH * self.state.cell_width() || round == SPREADINGS;
+            let tolerance = if last { self.settings.tolerance } else { SPREAD_TOLERANCE };
+            if let Some(stop) = self.newton(tolerance, progress)? {
+                return Ok(stop);
+            }
+            if last {
+                break;
+            }
+        }
+        self.state.follow_films();
+        Ok(Stop::Converged { steps: self.state.steps })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        foam::network::tests::hexagons,
+        surface::{LevelSet, Plane},
+    };
+    use glam::DVec3;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::sync::Arc;
+
+    const HEIGHT: f64 = 0.5;
+
+    fn crooked_hexagons() -> (Network, Gap) {
+        let mut network = hexagons(4, 4);
+        let [Some(x), Some(y), None] = network.period().0 else { panic!("a flat torus") };
+        let mut random = ChaCha8Rng::seed_from_u64(2);
+        let mut noise = || random.random_range(-0.1..0.1);
+        for vertex in network.vertices() {
+            let place = network.position(vertex) + DVec3::new(noise(), noise(), 0.0);
+            network.set_position(vertex, place);
+        }
+        let plane: Arc<dyn LevelSet> = Arc::new(Plane { periods: [x, y] });
+        (network, Gap::between(plane, [-0.5 * HEIGHT, 0.5 * HEIGHT]).unwrap())
+    }
+
+    #[test]
+    fn crooked_hexagons_become_the_hexagonal_foam() {
+        let (network, gap) = crooked_hexagons();
+        let mut last = 0.0;
+        let relaxed = relax(network, &gap, &RelaxSettings::default(), &mut |told| {
+            last = told.energy;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert!(matches!(relaxed.stop, Stop::Converged { .. }), "{:?}", relaxed.stop);
+        assert_eq!(relaxed.unstable, 0);
+        // Films are flat: the energy of cells of area 1 is exact, h √(2√3) each.
+        let exact = 16.0 * HEIGHT * (2.0 * 3.0_f64.sqrt()).sqrt();
+        assert!((last - exact).abs() < 1e-12 * exact, "{last} {exact}");
+    }
+
+    #[test]
+    fn a_state_read_back_goes_on_to_the_same_foam() {
+        let (network, gap) = crooked_hexagons();
+        let settings = RelaxSettings::default();
+        let mut saved = None;
+        let stopped = relax(network, &gap, &settings, &mut |told| {
+            saved = Some(serde_json::to_string(told.state).unwrap());
+            ControlFlow::Break(())
+        })
+        .unwrap();
+        assert_eq!(stopped.stop, Stop::Interrupted { steps: 1 });
+        let read: State = serde_json::from_str(&saved.unwrap()).unwrap();
+        let go_on = |state| resume(state, &gap, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
+        let (a, b) = (go_on(stopped.state), go_on(read));
+        assert!(matches!(a.stop, Stop::Converged { .. }));
+        assert_eq!(a.state.places, b.state.places);
+    }
+
+    #[test]
+    fn shares_must_be_one_positive_number_for_each_cell() {
+        let (network, gap) = crooked_hexagons();
+        for shares in [vec![1.0; 3], vec![0.0; 16], vec![f64::NAN; 16]] {
+            let settings = RelaxSettings { shares: Some(shares), ..RelaxSettings::default() };
+            let refused = relax(network.clone(), &gap, &settings, &mut |_| ControlFlow::Continue(()));
+            assert!(matches!(refused, Err(RelaxError::Shares { .. })));
+        }
+    }
+}

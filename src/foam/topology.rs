@@ -1,0 +1,74 @@
+//! T1s by geometry: when a film has shrunk, its network edge flips and the films round it are extruded anew.
+//!
+//! An edge flips when it is shorter than a part of the cell width. Each flip of an edge lowers the part for that edge, and
+//! the new edge is laid longer than the threshold: so no edge flips back and forth for ever.
+
+use super::{network::EdgeId, relax::State};
+use crate::surface::Gap;
+
+/// By how much each flip of an edge lowers its threshold.
+const WEARINESS: f64 = 0.6;
+
+/// The new edge's length in units of the cell width. Shorter ones are pulled apart in more steps, longer ones disturb the
+/// neighbours more.
+const NEW_LENGTH: f64 = 0.12;
+
+/// The edges that are short enough for a T1 and may flip, the shortest first.
+#[must_use]
+pub fn short_edges(state: &State, part: f64) -> Vec<EdgeId> {
+    let width = state.cell_width();
+    let mut short: Vec<(f64, EdgeId)> = state
+        .network
+        .edges()
+        .filter_map(|edge| {
+            let (a, b) = state.chord(edge);
+            let weary = WEARINESS.powi(i32::try_from(state.flips_of_edge[edge]).unwrap_or(i32::MAX));
+            let relative = a.distance(b) / (width * part * weary);
+            (relative < 1.0 && state.network.can_flip(edge).is_ok()).then_some((relative, edge))
+        })
+        .collect();
+    short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    short.into_iter().map(|(_, edge)| edge).collect()
+}
+
+/// Does the T1 of an edge: flips the network, turns the edge by a right angle within the middle surface and lays the five
+/// films that meet it anew. Gives whether it was done; otherwise only the edge's threshold has changed.
+pub fn flip(state: &mut State, gap: &Gap, edge: EdgeId) -> bool {
+    let before = state.clone();
+    state.follow_films();
+    if flip_in_place(state, gap, edge).is_some() {
+        return true;
+    }
+    *state = before;
+    state.flips_of_edge[edge] += 1;
+    false
+}
+
+fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Option<()> {
+    let (start, end) = state.chord(edge);
+    let width = state.cell_width();
+    state.network.flip(edge).ok()?;
+    let side = edge.half_edges()[0];
+    let (u, v) = (state.network.origin(side), state.network.target(side));
+    let far = state.network.period().translation(state.network.target_shift(side));
+    let middle = 0.5 * (start + end);
+    let up = gap.middle().normal(middle);
+    // The origin becomes the corner of the cell on the left of the old edge.
+    let left = up.cross(end - start).normalize_or(up.any_orthonormal_vector());
+    let half = 0.5 * NEW_LENGTH * width;
+    state.network.set_position(u, middle + half * left);
+    state.network.set_position(v, middle - half * left - far);
+    for vertex in [u, v] {
+        state.strips.lay_column(&state.network, gap, vertex, &mut state.places).ok()?;
+    }
+    let touched: Vec<EdgeId> = [u, v]
+        .into_iter()
+        .flat_map(|w| state.network.outgoing(w).map(|side| side.edge()).collect::<Vec<_>>())
+        .collect();
+    for edge in touched {
+        state.strips.lay_film(&state.network, gap, edge, &mut state.places).ok()?;
+    }
+    state.flips += 1;
+    state.flips_of_edge[edge] += 1;
+    Some(())
+}
