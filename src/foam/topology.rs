@@ -3,8 +3,11 @@
 //! An edge flips when it is shorter than a part of the cell width. Each flip of an edge lowers the part for that edge, and
 //! the new edge is laid longer than the threshold: so no edge flips back and forth for ever.
 
-use super::{network::EdgeId, relax::State};
-use crate::surface::Gap;
+use super::{
+    network::{EdgeId, HalfEdgeId, Network, VertexId},
+    relax::State,
+};
+use crate::{index::IndexVec, surface::Gap};
 
 /// By how much each flip of an edge lowers its threshold.
 const WEARINESS: f64 = 0.6;
@@ -13,22 +16,52 @@ const WEARINESS: f64 = 0.6;
 /// neighbours more.
 const NEW_LENGTH: f64 = 0.12;
 
-/// The edges that are short enough for a T1 and may flip, the shortest first.
+/// The most of its shortest neighbour's length that a new edge may have: longer ones would cross others.
+const ROOM: f64 = 0.5;
+
+/// The distance between the ends of every edge.
 #[must_use]
-pub fn short_edges(state: &State, part: f64) -> Vec<EdgeId> {
-    let width = state.cell_width();
-    let mut short: Vec<(f64, EdgeId)> = state
+pub fn edge_lengths(state: &State) -> IndexVec<EdgeId, f64> {
+    state
         .network
         .edges()
-        .filter_map(|edge| {
-            let (a, b) = state.chord(edge);
+        .map(|edge| {
+            let (start, end) = state.chord(edge);
+            start.distance(end)
+        })
+        .collect()
+}
+
+/// The edges that may flip, are shorter than `part` of the cell width and were longer `before`; the shortest first. Short edges
+/// that grow are left alone: a rough start has many.
+#[must_use]
+pub fn vanishing_edges(state: &State, before: &IndexVec<EdgeId, f64>, part: f64) -> Vec<EdgeId> {
+    let width = state.cell_width();
+    let mut short: Vec<(f64, EdgeId)> = edge_lengths(state)
+        .enumerated()
+        .filter_map(|(edge, &length)| {
             let weary = WEARINESS.powi(i32::try_from(state.flips_of_edge[edge]).unwrap_or(i32::MAX));
-            let relative = a.distance(b) / (width * part * weary);
-            (relative < 1.0 && state.network.can_flip(edge).is_ok()).then_some((relative, edge))
+            let relative = length / (width * part * weary);
+            (relative < 1.0 && length < before[edge] && state.network.can_flip(edge).is_ok())
+                .then_some((relative, edge))
         })
         .collect();
     short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     short.into_iter().map(|(_, edge)| edge).collect()
+}
+
+/// The two ends of an edge and their four other neighbours.
+#[must_use]
+pub fn round(network: &Network, edge: EdgeId) -> Vec<VertexId> {
+    let ends = edge.half_edges().map(|side| network.origin(side));
+    let mut round: Vec<VertexId> = ends
+        .iter()
+        .flat_map(|&end| network.outgoing(end).map(|side| network.target(side)))
+        .chain(ends)
+        .collect();
+    round.sort_unstable();
+    round.dedup();
+    round
 }
 
 /// Does the T1 of an edge: flips the network, turns the edge by a right angle within the middle surface and lays the five
@@ -44,9 +77,27 @@ pub fn flip(state: &mut State, gap: &Gap, edge: EdgeId) -> bool {
     false
 }
 
+/// The length of an edge after its flip: what the neighbours leave room for.
+fn new_length(state: &State, edge: EdgeId) -> f64 {
+    let network = &state.network;
+    let length = |edge| {
+        let (start, end) = state.chord(edge);
+        start.distance(end)
+    };
+    let shortest = edge
+        .half_edges()
+        .iter()
+        .flat_map(|&side| network.outgoing(network.origin(side)))
+        .map(HalfEdgeId::edge)
+        .filter(|&other| other != edge)
+        .map(length)
+        .fold(f64::INFINITY, f64::min);
+    (ROOM * shortest).min(NEW_LENGTH * state.cell_width()).max(length(edge))
+}
+
 fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Option<()> {
     let (start, end) = state.chord(edge);
-    let width = state.cell_width();
+    let length = new_length(state, edge);
     state.network.flip(edge).ok()?;
     let side = edge.half_edges()[0];
     let (u, v) = (state.network.origin(side), state.network.target(side));
@@ -55,7 +106,7 @@ fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Option<()> {
     let up = gap.middle().normal(middle);
     // The origin becomes the corner of the cell on the left of the old edge.
     let left = up.cross(end - start).normalize_or(up.any_orthonormal_vector());
-    let half = 0.5 * NEW_LENGTH * width;
+    let half = 0.5 * length;
     state.network.set_position(u, middle + half * left);
     state.network.set_position(v, middle - half * left - far);
     for vertex in [u, v] {

@@ -89,6 +89,8 @@ pub struct Descent {
 const LONGEST_STEP: f64 = 0.25;
 /// The part of an element's edge that one step may take away.
 const LARGEST_SHRINKING: f64 = 0.6;
+/// By what factor one step may change a volume: films between a swelling and a shrinking cell turn over beyond it.
+const MOST_GROWTH: f64 = 1.5;
 /// The wall patches are integrated anew after moves of this part of the cell size: strips are thin below it.
 const REBASE_AFTER: f64 = 0.1;
 /// The penalty on volume errors, in units of the tension over cell size and cell volume. A cell's own stiffness against a
@@ -96,12 +98,14 @@ const REBASE_AFTER: f64 = 0.1;
 const PENALTY: f64 = 10.0;
 /// Residuals below which full Newton steps are taken without a look at the merit.
 const TRUSTED: f64 = 1e-3;
+/// Volume errors above which pressures are those that balance the forces, not those that bring the volumes.
+const FAR: f64 = 0.02;
 /// Steps without progress before a descent counts as stalled.
 const IDLE_STEPS: usize = 25;
 /// A fall of the energy that counts as progress, relative.
 const FALL: f64 = 1e-6;
 /// Halvings of a step before it is stiffened instead.
-const HALVINGS: usize = 6;
+const HALVINGS: usize = 8;
 /// The first stiffening after a step that did not help, in units of the tension, and its growth.
 const FIRST_DAMPING: f64 = 1e-2;
 const DAMPING_GROWTH: f64 = 10.0;
@@ -191,8 +195,10 @@ impl Descent {
         let mut idle = 0;
         let mut steps = 0;
         loop {
-            let step = self.step()?;
-            let residuals = self.relative(&step.residuals, settings.length);
+            let now = self.volumes();
+            let aims = self.aims(&now);
+            let step = self.step(&aims)?;
+            let residuals = self.residuals(&step, &now, settings.length);
             let unstable = step.unstable;
             let ended = |ending| Ok(Descended { ending, steps, residuals, unstable });
             let size =
@@ -218,7 +224,7 @@ impl Descent {
                 (best, lowest) = (f64::INFINITY, f64::INFINITY);
                 self.leave_saddle(settings.length)?
             } else {
-                self.take(&step, &residuals, settings.length)
+                self.take(&step, &aims, &residuals, settings.length)
             };
             steps += 1;
             if observer(&DescentStep { descent: self, residuals, fraction, unstable }).is_break() {
@@ -227,19 +233,31 @@ impl Descent {
         }
     }
 
-    fn step(&self) -> Result<Step, FactorError> {
-        self.system.step(
-            &self.complex,
-            &self.places,
-            &self.reference,
-            &self.pressures,
-            &self.targets,
-            self.damping,
-        )
+    fn step(&self, aims: &IndexVec<RegionId, f64>) -> Result<Step, FactorError> {
+        self.system.step(&self.complex, &self.places, &self.reference, &self.pressures, aims, self.damping)
     }
 
-    fn relative(&self, residuals: &Residuals, length: f64) -> Residuals {
-        Residuals { force: residuals.force / length, volume: residuals.volume / self.mean_target() }
+    /// The volumes that the next step aims at: the targets, or as far towards them as films bear in one step.
+    fn aims(&self, now: &IndexVec<RegionId, f64>) -> IndexVec<RegionId, f64> {
+        let mut aims = self.targets.clone();
+        for (id, region) in self.complex.regions.enumerated() {
+            if region.kind == RegionKind::Cell && now[id] > 0.0 {
+                aims[id] = aims[id].clamp(now[id] / MOST_GROWTH, now[id] * MOST_GROWTH);
+            }
+        }
+        self.fit(&mut aims, now);
+        aims
+    }
+
+    fn residuals(&self, step: &Step, now: &IndexVec<RegionId, f64>, length: f64) -> Residuals {
+        let worst = self
+            .complex
+            .regions
+            .enumerated()
+            .filter(|(_, region)| region.kind == RegionKind::Cell)
+            .map(|(id, _)| (now[id] - self.targets[id]).abs())
+            .fold(0.0, |a: f64, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) });
+        Residuals { force: step.residuals.force / length, volume: worst / self.mean_target() }
     }
 
     fn mean_target(&self) -> f64 {
@@ -254,21 +272,28 @@ impl Descent {
 
     /// Takes as much of a step as the elements bear and the merit allows. Gives the fraction taken: 0 if there is none; the
     /// next step is stiffer then.
-    fn take(&mut self, step: &Step, residuals: &Residuals, length: f64) -> f64 {
+    fn take(
+        &mut self,
+        step: &Step,
+        aims: &IndexVec<RegionId, f64>,
+        residuals: &Residuals,
+        length: f64,
+    ) -> f64 {
         let longest = self.longest_fraction(&step.displacements, length);
         let near = residuals.force < TRUSTED
             && residuals.volume < TRUSTED
             && step.unstable == 0
             && self.damping < MOST_DAMPING;
-        let start = if near { 0.0 } else { self.merit(step, &self.places, length) };
+        let start = if near { 0.0 } else { self.merit(step, aims, &self.places, length) };
         let mut fraction = longest;
         for _ in 0..HALVINGS {
             if let Some(places) = self.system.moved(&self.complex, &self.places, step, fraction)
                 && self.keeps_elements(&places)
-                && (near || self.merit(step, &places, length) <= start)
+                && (near || self.merit(step, aims, &places, length) <= start)
             {
                 self.places = places;
-                for (id, change) in step.direction.pressures.enumerated() {
+                let changes = if residuals.volume > FAR { &step.balance } else { &step.direction.pressures };
+                for (id, change) in changes.enumerated() {
                     self.pressures[id] += *change;
                 }
                 if self.moved_since_reference() > REBASE_AFTER * length {
@@ -285,7 +310,7 @@ impl Descent {
     }
 
     /// The augmented Lagrangian at the step's new pressures: a Newton step goes downhill on it if the penalty is stiff.
-    fn merit(&self, step: &Step, places: &Places, length: f64) -> f64 {
+    fn merit(&self, step: &Step, aims: &IndexVec<RegionId, f64>, places: &Places, length: f64) -> f64 {
         let now = volumes(&self.complex, places, &self.reference);
         let stiffness = PENALTY / (length * self.mean_target());
         let work: f64 = now
@@ -295,7 +320,7 @@ impl Descent {
                 match self.complex.regions[id].kind {
                     RegionKind::Open => -pressure * volume,
                     RegionKind::Cell => {
-                        let missing = volume - self.targets[id];
+                        let missing = volume - aims[id];
                         (0.5 * stiffness * missing - pressure) * missing
                     }
                 }
@@ -350,15 +375,19 @@ impl Descent {
     /// The wanted volumes; in closed parts brought to the sum that the walls hold.
     fn fitted_targets(&self) -> IndexVec<RegionId, f64> {
         let mut targets = self.wanted.clone();
-        let now = self.volumes();
+        self.fit(&mut targets, &self.volumes());
+        targets
+    }
+
+    /// Brings the volumes of closed parts to the sum that they have now.
+    fn fit(&self, volumes: &mut IndexVec<RegionId, f64>, now: &IndexVec<RegionId, f64>) {
         for part in self.system.closed_parts() {
             let total: f64 = part.iter().map(|&id| now[id]).sum();
-            let wanted: f64 = part.iter().map(|&id| self.wanted[id]).sum();
+            let sum: f64 = part.iter().map(|&id| volumes[id]).sum();
             for &id in part {
-                targets[id] *= total / wanted;
+                volumes[id] *= total / sum;
             }
         }
-        targets
     }
 
     /// Leaves a balance that is no minimum along its lowest mode, to the side where the energy falls faster. Gives 1.
@@ -371,7 +400,7 @@ impl Descent {
             .into_iter()
             .filter_map(|push| self.system.moved(&self.complex, &self.places, &step, push))
             .filter(|places| self.keeps_elements(places))
-            .map(|places| (self.merit(&step, &places, length), places))
+            .map(|places| (self.merit(&step, &self.targets, &places, length), places))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, places)) = best {
             self.set_places(places);

@@ -12,13 +12,13 @@ pub use state::{STATE_SCHEMA, State};
 
 use super::{
     complex::{NoExtrusion, Strips},
-    network::{CellId, Network},
+    network::{CellId, EdgeId, Network, VertexId},
     solve::{FactorError, Residuals},
     topology,
 };
 use crate::{index::IndexVec, surface::Gap};
 use serde::{Deserialize, Serialize};
-use std::ops::ControlFlow;
+use std::{collections::BTreeSet, ops::ControlFlow};
 
 /// What can be set about a relaxation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -195,6 +195,9 @@ const SPREADINGS: usize = 5;
 /// Nodes that move less than this part of the cell width need not be spread again.
 const EVEN_ENOUGH: f64 = 1e-6;
 
+/// Steps shorter than this part of Newton's leave uneven nodes behind, which stop later ones.
+const DAMPED: f64 = 0.9;
+
 struct Run<'a> {
     gap: &'a Gap,
     settings: &'a RelaxSettings,
@@ -207,6 +210,7 @@ struct Run<'a> {
 /// Why Newton steps were halted.
 enum Halt {
     Flip,
+    Spread,
     Interrupt,
 }
 
@@ -232,7 +236,9 @@ impl<'a> Run<'a> {
             };
             let flip_below = self.settings.flip_below;
             let Self { state, descent, .. } = self;
+            let mut lengths = topology::edge_lengths(state);
             let mut halt = None;
+            let mut vanishing = Vec::new();
             let descended = descent.descend(&settings, &mut |told| {
                 state.follow(told.descent);
                 let told = Progress {
@@ -244,8 +250,14 @@ impl<'a> Run<'a> {
                 };
                 if progress(&told).is_break() {
                     halt = Some(Halt::Interrupt);
-                } else if !topology::short_edges(state, flip_below).is_empty() {
-                    halt = Some(Halt::Flip);
+                } else {
+                    let before = std::mem::replace(&mut lengths, topology::edge_lengths(state));
+                    vanishing = topology::vanishing_edges(state, &before, flip_below);
+                    halt = if !vanishing.is_empty() {
+                        Some(Halt::Flip)
+                    } else {
+                        (told.fraction < DAMPED).then_some(Halt::Spread)
+                    };
                 }
                 if halt.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
@@ -259,20 +271,38 @@ impl<'a> Run<'a> {
                 (Ending::Converged, _) => return Ok(None),
                 (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
                 (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
-                (Ending::Halted, Some(Halt::Flip)) => self.flip_short()?,
+                (Ending::Halted, Some(Halt::Flip)) => self.flip(&vanishing)?,
+                (Ending::Halted, Some(Halt::Spread)) => {
+                    self.spread();
+                }
                 (Ending::Halted, _) => return Ok(Some(Stop::Interrupted { steps })),
             }
         }
     }
 
-    /// Flips the edges that are short enough.
-    fn flip_short(&mut self) -> Result<(), RelaxError> {
-        // An earlier flip may have lengthened the next edge or made its flip impossible.
-        while let Some(&edge) = topology::short_edges(&self.state, self.settings.flip_below).first() {
-            topology::flip(&mut self.state, self.gap, edge);
+    /// Flips edges that do not touch each other, in order.
+    fn flip(&mut self, vanishing: &[EdgeId]) -> Result<(), RelaxError> {
+        let mut touched: BTreeSet<VertexId> = BTreeSet::new();
+        for &edge in vanishing {
+            let round = topology::round(&self.state.network, edge);
+            if round.iter().all(|vertex| !touched.contains(vertex)) {
+                topology::flip(&mut self.state, self.gap, edge);
+                touched.extend(round);
+            }
         }
         self.descent = self.state.descent(self.gap)?;
         Ok(())
+    }
+
+    /// Spreads the nodes evenly along the films. Gives the largest move.
+    fn spread(&mut self) -> f64 {
+        let mut places = self.state.places.clone();
+        let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
+        if self.descent.complex().retract(&mut places).is_ok() {
+            self.state.places.clone_from(&places);
+            self.descent.set_places(places);
+        }
+        moved
     }
 
     /// The final mesh: refined, spread evenly, converged.
@@ -286,11 +316,7 @@ impl<'a> Run<'a> {
         }
         let mut last = false;
         for round in 1..=SPREADINGS {
-            let mut places = self.state.places.clone();
-            let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
-            if self.descent.complex().retract(&mut places).is_ok() {
-                self.descent.set_places(places);
-            }
+            let moved = self.spread();
             last |= moved <= EVEN_ENOUGH * self.state.cell_width() || round == SPREADINGS;
             let tolerance = if last { self.settings.tolerance } else { SPREAD_TOLERANCE };
             if let Some(stop) = self.newton(tolerance, progress)? {

@@ -64,6 +64,9 @@ pub struct Direction {
 pub struct Step {
     /// Where to go.
     pub direction: Direction,
+    /// The change of pressures that balances the forces best where the films are now, whatever the volumes: far from the
+    /// wanted volumes those of `direction` are what it takes to get there, and bend the Hessian of the next step.
+    pub balance: IndexVec<RegionId, f64>,
     /// Displacements of all nodes for the full step, before the return to the walls.
     pub displacements: Places,
     /// The part of them that belongs to each node's own freedoms.
@@ -201,20 +204,23 @@ impl System {
         let assembled = self.assemble(&at);
         let walls = self.wall_entries(&at, &assembled);
         let (rhs, residuals) = self.loads(complex, &assembled, &now, targets);
+        let mut forces = rhs.clone();
+        forces.pressures.iter_mut().for_each(|missing| *missing = 0.0);
         let mut solution = None;
         let (unstable, shift) = self.stiffened(&assembled, &walls, damping, |factored, films| {
             solution = self
                 .solve(factored, films, &rhs)
+                .and_then(|direction| Ok((direction, self.solve(factored, films, &forces)?.pressures)))
                 .ok()
-                .filter(|direction| direction.freedoms.iter().all(|x| x.is_finite()));
+                .filter(|(direction, _)| direction.freedoms.iter().all(|x| x.is_finite()));
             solution.is_some()
         })?;
-        let Some(direction) = solution else {
+        let Some((direction, balance)) = solution else {
             return Err(FactorError::Singular { unknowns: self.layout.unknowns });
         };
         let own_displacements = self.own_displacements(complex, &motions, &direction);
         let displacements = self.displacements(complex, places, &own_displacements);
-        Ok(Step { direction, displacements, own_displacements, residuals, unstable, shift })
+        Ok(Step { direction, balance, displacements, own_displacements, residuals, unstable, shift })
     }
 
     /// Stiffens the Hessian from `damping` on until it is positive on the constraints and `accept` takes its factors. Gives

@@ -71,7 +71,8 @@ impl System {
         let own_displacements = self.own_displacements(complex, &motions, &direction);
         let displacements = self.displacements(complex, places, &own_displacements);
         let residuals = Residuals { force: 0.0, volume: 0.0 };
-        Step { direction, displacements, own_displacements, residuals, unstable: 0, shift: 0.0 }
+        let balance = direction.pressures.clone();
+        Step { direction, balance, displacements, own_displacements, residuals, unstable: 0, shift: 0.0 }
     }
 
     /// A direction with a part along every mode, always the same.

@@ -111,6 +111,7 @@ fn the_lagrangian_along_a_step_has_the_slope_and_the_bend_that_the_system_says()
     let step = Step {
         displacements: system.displacements(&complex, &places, &own_displacements),
         own_displacements,
+        balance: direction.pressures.clone(),
         direction,
         residuals: Residuals { force: 0.0, volume: 0.0 },
         unstable: 0,

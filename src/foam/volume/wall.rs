@@ -35,8 +35,8 @@ pub(super) fn height(wall: &Wall, y: DVec3, direction: DVec3, guess: f64) -> f64
     let mut last = f64::INFINITY;
     for _ in 0..FOOT_STEPS {
         let p = y + z * direction;
-        let slope = wall.field.gradient(p).dot(direction);
-        let step = wall.value(p) / slope;
+        let (value, gradient) = wall.field.value_and_gradient(p);
+        let step = (value - wall.level) / gradient.dot(direction);
         z -= step;
         // Newton steps shrink quadratically until rounding: stop when they no longer do.
         let size = step.abs();
