@@ -2,18 +2,28 @@
 //!
 //! After Meyer's flooding: pixels are visited in order of the height at which the flood reaches them, first come first
 //! served among equals, so that a flat top is shared in the middle. Heights are quantised, which makes the queue a row of
-//! buckets and the result independent of anything but the input.
+//! buckets. The raster is flooded in tiles that overlap by more than a cell's reach; their number follows from the raster
+//! alone, so that the result is the same for any number of threads.
 
-use super::plane::{Plane, pixel};
+use super::{
+    kinds::median,
+    plane::{Plane, pixel, pixels},
+    terrain::{self, LEVELS, Tile},
+};
 use glam::DVec2;
-use std::collections::VecDeque;
+use rayon::prelude::*;
+use std::ops::Range;
 
-/// Heights that are told apart.
-const LEVELS: usize = 512;
 /// Radius of a marker, in pitches: inside any cell, and wide enough to cover a glint at its centre.
 const MARKER_RADIUS: f64 = 0.16;
 /// A cell ends this far from its marker, in pitches: corners of a regular cell are at 0.58.
-const REACH: f64 = 0.95;
+pub(crate) const REACH: f64 = 0.95;
+/// Longest edge of a tile in pixels, without its margin.
+const TILE: usize = 1536;
+/// Overlap of tiles, in pitches: the reach of a cell and of the neighbours that it competes with.
+const MARGIN: f64 = 2.0;
+/// A pixel that nothing has flooded yet.
+const DRY: u32 = Segmentation::NONE - 1;
 
 /// Which cell each pixel belongs to.
 #[derive(Clone, Debug)]
@@ -67,48 +77,127 @@ pub(crate) fn flood(
     hidden: Option<&[bool]>,
 ) -> Segmentation {
     let (width, height) = (relief.width(), relief.height());
-    let levels = quantised(relief);
-    let is_hidden = |index: usize| hidden.is_some_and(|h| h[index]);
     let mut labels = vec![Segmentation::NONE; width * height];
-    let mut buckets: Vec<VecDeque<usize>> = vec![VecDeque::new(); LEVELS];
-    for (label, (centre, pitch)) in markers.iter().zip(pitches).enumerate() {
-        for index in disc(*centre, MARKER_RADIUS * pitch, width, height) {
-            if labels[index] == Segmentation::NONE && !is_hidden(index) {
-                labels[index] = crate::index::checked_u32(label);
-                buckets[0].push_back(index);
+    let margin = pixels(MARGIN * pitches.iter().copied().fold(0.0, f64::max));
+    let ground = Ground { relief, markers, pitches, hidden, pitch: median(pitches.iter().copied()).max(1.0) };
+    let (columns, rows) = (cores(width), cores(height));
+    let mut rest = labels.as_mut_slice();
+    let mut bands = Vec::with_capacity(rows.len());
+    for rows in rows {
+        let (band, after) = rest.split_at_mut(rows.len() * width);
+        bands.push((rows, band));
+        rest = after;
+    }
+    bands.into_par_iter().for_each(|(rows, band)| {
+        let floods: Vec<(Range<usize>, Tile, Vec<u32>)> = columns
+            .clone()
+            .into_par_iter()
+            .map(|core| {
+                let tile =
+                    Tile { columns: widened(&core, margin, width), rows: widened(&rows, margin, height) };
+                let labels = ground.flood(&tile);
+                (core, tile, labels)
+            })
+            .collect();
+        for (core, tile, labels) in floods {
+            for y in rows.clone() {
+                let from = (y - tile.rows.start + 1) * (tile.columns.len() + 2) + core.start
+                    - tile.columns.start
+                    + 1;
+                let to = (y - rows.start) * width;
+                band[to + core.start..to + core.end].copy_from_slice(&labels[from..from + core.len()]);
             }
         }
-    }
-    let mut level = 0;
-    while level < LEVELS {
-        let Some(index) = buckets[level].pop_front() else {
-            level += 1;
-            continue;
-        };
-        let label = labels[index];
-        let centre = markers[label as usize];
-        let reach = REACH * pitches[label as usize];
-        for next in beside(index, width, height) {
-            let place = DVec2::new((next % width) as f64 + 0.5, (next / width) as f64 + 0.5);
-            let free = labels[next] == Segmentation::NONE && !is_hidden(next);
-            if free && place.distance_squared(centre) < reach * reach {
-                labels[next] = label;
-                buckets[usize::from(levels[next]).max(level)].push_back(next);
-            }
-        }
-    }
+    });
     Segmentation { width, height, labels }
 }
 
-fn quantised(relief: &Plane) -> Vec<u16> {
-    let (low, high) = relief
-        .data()
-        .iter()
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-    let range = f64::from(high - low).max(1e-12);
-    let top = (LEVELS - 1) as f64;
-    let level = |v: &f32| u16::try_from(pixel(f64::from(v - low) / range * top, LEVELS)).unwrap_or(0);
-    relief.data().iter().map(level).collect()
+/// A length in parts of nearly the same size, none longer than [`TILE`].
+fn cores(length: usize) -> Vec<Range<usize>> {
+    let count = length.div_ceil(TILE).max(1);
+    (0..count).map(|k| k * length / count..(k + 1) * length / count).collect()
+}
+
+fn widened(range: &Range<usize>, margin: usize, size: usize) -> Range<usize> {
+    range.start.saturating_sub(margin)..(range.end + margin).min(size)
+}
+
+struct Ground<'a> {
+    relief: &'a Plane,
+    markers: &'a [DVec2],
+    pitches: &'a [f64],
+    hidden: Option<&'a [bool]>,
+    pitch: f64,
+}
+
+impl Ground<'_> {
+    /// Labels of a tile's pixels with a frame of one pixel around them, hidden pixels and frame as [`Segmentation::NONE`].
+    fn flood(&self, tile: &Tile) -> Vec<u32> {
+        let levels = terrain::levels(self.relief, tile, self.pitch);
+        let (width, stride) = (tile.columns.len(), tile.columns.len() + 2);
+        let mut labels = self.dry(tile);
+        let corner = DVec2::new(tile.columns.start as f64, tile.rows.start as f64) - 1.0;
+        let mut buckets: Vec<Vec<usize>> = vec![Vec::new(); LEVELS];
+        self.mark(tile, corner, &mut labels, &mut buckets[0]);
+        for level in 0..LEVELS {
+            let mut next = 0;
+            while let Some(&index) = buckets[level].get(next) {
+                next += 1;
+                let label = labels[index];
+                let (centre, pitch) = (self.markers[label as usize] - corner, self.pitches[label as usize]);
+                let reach = REACH * pitch;
+                for beside in [index - stride, index - 1, index + 1, index + stride] {
+                    if labels[beside] != DRY {
+                        continue;
+                    }
+                    let (x, y) = (beside % stride, beside / stride);
+                    let place = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+                    if place.distance_squared(centre) < reach * reach {
+                        labels[beside] = label;
+                        let height = usize::from(levels[(y - 1) * width + x - 1]);
+                        buckets[height.max(level)].push(beside);
+                    }
+                }
+            }
+            buckets[level] = Vec::new();
+        }
+        labels.iter_mut().filter(|l| **l == DRY).for_each(|l| *l = Segmentation::NONE);
+        labels
+    }
+
+    /// A tile that nothing has flooded yet.
+    fn dry(&self, tile: &Tile) -> Vec<u32> {
+        let stride = tile.columns.len() + 2;
+        let mut labels = vec![Segmentation::NONE; stride * (tile.rows.len() + 2)];
+        for (y, row) in tile.rows.clone().zip(labels.chunks_mut(stride).skip(1)) {
+            for (x, label) in tile.columns.clone().zip(&mut row[1..]) {
+                if !self.hidden.is_some_and(|h| h[y * self.relief.width() + x]) {
+                    *label = DRY;
+                }
+            }
+        }
+        labels
+    }
+
+    /// Labels the markers' discs within a tile and lists their pixels.
+    fn mark(&self, tile: &Tile, corner: DVec2, labels: &mut [u32], wet: &mut Vec<usize>) {
+        let (width, height) = (tile.columns.len(), tile.rows.len());
+        let limit = DVec2::new(width as f64, height as f64);
+        for (label, (centre, pitch)) in self.markers.iter().zip(self.pitches).enumerate() {
+            let at = *centre - corner - 1.0;
+            let radius = MARKER_RADIUS * pitch;
+            if at.cmplt(DVec2::splat(-radius)).any() || at.cmpgt(limit + radius).any() {
+                continue;
+            }
+            for index in disc(at, radius, width, height) {
+                let index = (index / width + 1) * (width + 2) + index % width + 1;
+                if labels[index] == DRY {
+                    labels[index] = crate::index::checked_u32(label);
+                    wet.push(index);
+                }
+            }
+        }
+    }
 }
 
 /// Pixels within `radius` of `centre`; of a centre outside the raster, those that are inside.
@@ -120,14 +209,4 @@ pub(crate) fn disc(centre: DVec2, radius: f64, width: usize, height: usize) -> i
             (place.distance_squared(centre) <= radius * radius).then_some(y * width + x)
         })
     })
-}
-
-/// The four pixels beside a pixel.
-fn beside(index: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
-    let (x, y) = (index % width, index / width);
-    let left = (x > 0).then(|| index - 1);
-    let right = (x + 1 < width).then(|| index + 1);
-    let up = (y > 0).then(|| index - width);
-    let down = (y + 1 < height).then(|| index + width);
-    [up, left, right, down].into_iter().flatten()
 }

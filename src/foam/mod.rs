@@ -14,7 +14,7 @@
 //! | Newton steps on the constrained system | `solve/` |
 //! | when a film has shrunk: T1 by geometry | `topology.rs` |
 //! | the descent of any film complex; the whole run with its T1s, and its state as data | `relax/` |
-| pressures against sides and curvature, cell by cell | `audit.rs` |
+//! | pressures against sides and curvature, cell by cell | `audit.rs` |
 //! | who touches whom, for the comparison with combs | `pattern.rs` |
 //!
 //! Not promised: a relaxed foam is a local minimum; other seeds may lie lower. Cells must be small against the curvature of
