@@ -8,6 +8,7 @@ use super::{
     relax::State,
 };
 use crate::{index::IndexVec, surface::Gap};
+use glam::DVec3;
 
 /// By how much each flip of an edge lowers its threshold.
 const WEARINESS: f64 = 0.6;
@@ -64,7 +65,7 @@ pub fn round(network: &Network, edge: EdgeId) -> Vec<VertexId> {
     round
 }
 
-/// Does the T1 of an edge: flips the network, turns the edge by a right angle within the middle surface and lays the five
+/// Does the T1 of an edge: flips the network, turns the edge across the middle surface and lays the five
 /// films that meet it anew. Gives whether it was done; otherwise only the edge's threshold has changed.
 pub fn flip(state: &mut State, gap: &Gap, edge: EdgeId) -> bool {
     let before = state.clone();
@@ -103,9 +104,17 @@ fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Option<()> {
     let (u, v) = (state.network.origin(side), state.network.target(side));
     let far = state.network.period().translation(state.network.target_shift(side));
     let middle = 0.5 * (start + end);
+    // Across the middle surface from the neighbours of the one new corner to those of the other: the old edge is too short
+    // to say where to turn.
+    let neighbours = |vertex: VertexId, frame: DVec3| -> DVec3 {
+        let others = state.network.outgoing(vertex).filter(|&side| side.edge() != edge);
+        others
+            .map(|side| 0.5 * (state.network.position(vertex) + state.network.edge_vector(side) + frame))
+            .sum()
+    };
+    let across = neighbours(u, DVec3::ZERO) - neighbours(v, far);
     let up = gap.middle().normal(middle);
-    // The origin becomes the corner of the cell on the left of the old edge.
-    let left = up.cross(end - start).normalize_or(up.any_orthonormal_vector());
+    let left = (across - across.dot(up) * up).normalize_or(up.any_orthonormal_vector());
     let half = 0.5 * length;
     state.network.set_position(u, middle + half * left);
     state.network.set_position(v, middle - half * left - far);

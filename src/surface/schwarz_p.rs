@@ -1,6 +1,6 @@
 //! The nodal Schwarz P-surface.
 
-use super::{GridSampler, LevelSet, NoFoot, Period, nearest, rows::Separable};
+use super::{GridSampler, Jet, LevelSet, NoFoot, Period, nearest, rows::Separable};
 use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
 
@@ -47,6 +47,16 @@ impl LevelSet for SchwarzP {
     fn hessian(&self, p: DVec3) -> DMat3 {
         let k = TAU / self.period;
         DMat3::from_diagonal(-k * k * DVec3::new((k * p.x).cos(), (k * p.y).cos(), (k * p.z).cos()))
+    }
+
+    fn jet(&self, p: DVec3) -> Jet {
+        let k = TAU / self.period;
+        let [x, y, z] = (k * p).to_array().map(f64::sin_cos);
+        Jet {
+            value: x.1 + y.1 + z.1,
+            gradient: -k * DVec3::new(x.0, y.0, z.0),
+            hessian: DMat3::from_diagonal(-k * k * DVec3::new(x.1, y.1, z.1)),
+        }
     }
 
     fn period(&self) -> Period {

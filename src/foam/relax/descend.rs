@@ -10,7 +10,7 @@ use crate::{
     foam::{
         complex::{Complex, Places, RegionId, RegionKind},
         energy::{self, energy},
-        solve::{FactorError, Residuals, Step, System},
+        solve::{FactorError, Mode, Residuals, Step, System},
         volume::{Reference, volumes},
     },
     index::IndexVec,
@@ -114,6 +114,8 @@ const MOST_DAMPING: f64 = 1e4;
 /// How far a saddle is left along its lowest mode, in units of the cell size: far enough that the energy falls by more than
 /// rounding, near enough that the mode still is one.
 const PUSH: f64 = 0.02;
+/// Saddles that one descent leaves: one that comes back each time has a mode that the mesh makes up.
+const MOST_PUSHES: usize = 10;
 
 impl Descent {
     /// Starts at `places` with the given `pressures`; these are the Lagrange multipliers' first guess for cells and the true
@@ -181,6 +183,21 @@ impl Descent {
         self.rebase();
     }
 
+    /// Integrates all wall patches where the films are now: small errors of the strips that were added since vanish.
+    pub fn integrate_walls(&mut self) {
+        self.reference = Reference::new(&self.complex, &self.places);
+        self.targets = self.fitted_targets();
+        self.system.reframe(&self.complex, &self.places);
+    }
+
+    /// The softest way in which the films can move at constant volumes.
+    ///
+    /// # Errors
+    /// [`FactorError`] as for a step.
+    pub fn lowest_mode(&self) -> Result<Mode, FactorError> {
+        self.system.lowest_mode(&self.complex, &self.places, &self.reference, &self.pressures)
+    }
+
     /// Newton steps until `settings` are met.
     ///
     /// # Errors
@@ -193,11 +210,13 @@ impl Descent {
         let mut best = f64::INFINITY;
         let mut lowest = f64::INFINITY;
         let mut idle = 0;
+        let mut pushes = 0;
         let mut steps = 0;
         loop {
             let now = self.volumes();
             let aims = self.aims(&now);
-            let step = self.step(&aims)?;
+            let excess = now.iter().zip(&aims).map(|(now, aim)| now - aim).collect();
+            let step = self.step(&excess)?;
             let residuals = self.residuals(&step, &now, settings.length);
             let unstable = step.unstable;
             let ended = |ending| Ok(Descended { ending, steps, residuals, unstable });
@@ -221,6 +240,10 @@ impl Descent {
                 return ended(Ending::Stalled);
             }
             let fraction = if size <= 1.0 {
+                pushes += 1;
+                if pushes > MOST_PUSHES {
+                    return ended(Ending::Stalled);
+                }
                 (best, lowest) = (f64::INFINITY, f64::INFINITY);
                 self.leave_saddle(settings.length)?
             } else {
@@ -233,8 +256,15 @@ impl Descent {
         }
     }
 
-    fn step(&self, aims: &IndexVec<RegionId, f64>) -> Result<Step, FactorError> {
-        self.system.step(&self.complex, &self.places, &self.reference, &self.pressures, aims, self.damping)
+    fn step(&self, excess: &IndexVec<RegionId, f64>) -> Result<Step, FactorError> {
+        self.system.step_by(
+            &self.complex,
+            &self.places,
+            &self.reference,
+            &self.pressures,
+            excess,
+            self.damping,
+        )
     }
 
     /// The volumes that the next step aims at: the targets, or as far towards them as films bear in one step.
@@ -367,7 +397,7 @@ impl Descent {
 
     /// Integrates the wall patches anew and takes new frames.
     fn rebase(&mut self) {
-        self.reference = Reference::new(&self.complex, &self.places);
+        self.reference = self.reference.moved(&self.complex, &self.places);
         self.targets = self.fitted_targets();
         self.system.reframe(&self.complex, &self.places);
     }
@@ -392,7 +422,7 @@ impl Descent {
 
     /// Leaves a balance that is no minimum along its lowest mode, to the side where the energy falls faster. Gives 1.
     fn leave_saddle(&mut self, length: f64) -> Result<f64, FactorError> {
-        let mode = self.system.lowest_mode(&self.complex, &self.places, &self.reference, &self.pressures)?;
+        let mode = self.lowest_mode()?;
         let step = self.system.along(&self.complex, &self.places, mode.direction);
         let longest = step.displacements.iter().map(|d| d.length()).fold(0.0, f64::max);
         let push = PUSH * length / longest;

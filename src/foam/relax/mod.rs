@@ -23,7 +23,7 @@ use std::{collections::BTreeSet, ops::ControlFlow};
 /// What can be set about a relaxation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RelaxSettings {
-    /// The mesh of the result.
+    /// The mesh of the result; films that turn far with the walls get more elements along.
     pub strips: Strips,
     /// Ends when the largest force on a freedom is below this, in units of tension × cell width.
     pub tolerance: f64,
@@ -34,6 +34,9 @@ pub struct RelaxSettings {
     /// A film flips when its edge is shorter than this part of the cell width. Above 0.1 sound short edges flip; below 0.02
     /// Newton steps on the sliver are slow.
     pub flip_below: f64,
+    /// Whether the softest mode of a converged foam is computed: it takes about as long as ten steps.
+    #[serde(default)]
+    pub softest_mode: bool,
     /// Each cell's share of the gap's volume; equal ones if none are given.
     pub shares: Option<Vec<f64>>,
 }
@@ -46,6 +49,7 @@ impl Default for RelaxSettings {
             volume_tolerance: 1e-11,
             step_limit: 400,
             flip_below: 0.05,
+            softest_mode: false,
             shares: None,
         }
     }
@@ -105,6 +109,9 @@ pub struct Relaxed {
     pub residuals: Residuals,
     /// Directions of negative curvature at the end: 0 at a minimum.
     pub unstable: usize,
+    /// The lowest eigenvalue of the Hessian on the constraints at the end (see [`crate::foam::solve::Mode`]), where it was
+    /// converged and asked for.
+    pub softest: Option<f64>,
 }
 
 /// A relaxation that could not even start.
@@ -141,9 +148,34 @@ pub fn relax(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
     let shares = shares(&network, settings.shares.as_deref())?;
-    let coarse = Strips { along: 2, through: 1 };
-    let state = State::new(network, gap, coarse, shares)?;
+    let coarse = Strips { along: LEAST_ALONG, through: 1 };
+    let mut state = State::new(network, gap, coarse, shares)?;
+    let along = elements_along(&state, gap);
+    if along > coarse.along {
+        state = State::new(state.network, gap, Strips { along, ..coarse }, state.shares)?;
+    }
     resume(state, gap, settings, progress)
+}
+
+/// The least number of elements along a film: with one, T1s happen on films that are only bent.
+const LEAST_ALONG: usize = 2;
+/// The most elements along a film of the coarse mesh: half a great circle needs no more.
+const MOST_ALONG: usize = 8;
+/// The angle that one element may turn with the walls, in radians: at 1.5 a film leaves the gap between its nodes.
+const MOST_TURN: f64 = 0.9;
+
+/// How many elements along each film follow the walls.
+fn elements_along(state: &State, gap: &Gap) -> usize {
+    let network = &state.network;
+    let turn = network.edges().map(|edge| {
+        let side = edge.half_edges()[0];
+        let mut line = state.side_line(side, state.rows() / 2);
+        line.extend(state.side_line(network.next(side), state.rows() / 2).first());
+        let length: f64 = line.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+        length * gap.middle().curvature(line[line.len() / 2]).largest()
+    });
+    let most = turn.filter(|turn| turn.is_finite()).fold(0.0, f64::max) / MOST_TURN;
+    (LEAST_ALONG..MOST_ALONG).find(|&along| real(along) >= most).unwrap_or(MOST_ALONG)
 }
 
 fn shares(network: &Network, given: Option<&[f64]>) -> Result<IndexVec<CellId, f64>, RelaxError> {
@@ -183,7 +215,13 @@ pub fn resume(
         Some(stop) => stop,
         None => run.finish(progress)?,
     };
-    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable })
+    let softest = match stop {
+        Stop::Converged { .. } if settings.softest_mode => {
+            run.descent.lowest_mode().ok().map(|mode| mode.eigenvalue)
+        }
+        _ => None,
+    };
+    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable, softest })
 }
 
 /// The residual at which the mesh is refined: T1s have ended there, and two more steps would converge the coarse mesh.
@@ -197,6 +235,10 @@ const EVEN_ENOUGH: f64 = 1e-6;
 
 /// Steps shorter than this part of Newton's leave uneven nodes behind, which stop later ones.
 const DAMPED: f64 = 0.9;
+
+/// Steps after the last T1 in which uneven nodes are spread after damped steps; what has not settled by then, spreading
+/// alone will not settle.
+const SPREAD_FOR: usize = 30;
 
 struct Run<'a> {
     gap: &'a Gap,
@@ -227,6 +269,7 @@ impl<'a> Run<'a> {
         tolerance: f64,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Option<Stop>, RelaxError> {
+        let mut patience = self.state.steps + SPREAD_FOR;
         loop {
             let settings = DescentSettings {
                 length: self.state.cell_width(),
@@ -256,7 +299,7 @@ impl<'a> Run<'a> {
                     halt = if !vanishing.is_empty() {
                         Some(Halt::Flip)
                     } else {
-                        (told.fraction < DAMPED).then_some(Halt::Spread)
+                        (told.fraction < DAMPED && state.steps < patience).then_some(Halt::Spread)
                     };
                 }
                 if halt.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -271,7 +314,10 @@ impl<'a> Run<'a> {
                 (Ending::Converged, _) => return Ok(None),
                 (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
                 (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
-                (Ending::Halted, Some(Halt::Flip)) => self.flip(&vanishing)?,
+                (Ending::Halted, Some(Halt::Flip)) => {
+                    self.flip(&vanishing)?;
+                    patience = steps + SPREAD_FOR;
+                }
                 (Ending::Halted, Some(Halt::Spread)) => {
                     self.spread();
                 }
@@ -310,14 +356,19 @@ impl<'a> Run<'a> {
         &mut self,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Stop, RelaxError> {
-        if self.state.strips != self.settings.strips {
-            self.state.refine(self.settings.strips);
+        let Strips { along, through } = self.settings.strips;
+        let strips = Strips { along: along.max(self.state.strips.along), through };
+        if self.state.strips != strips {
+            self.state.refine(strips);
             self.descent = self.state.descent(self.gap)?;
         }
         let mut last = false;
         for round in 1..=SPREADINGS {
             let moved = self.spread();
             last |= moved <= EVEN_ENOUGH * self.state.cell_width() || round == SPREADINGS;
+            if last {
+                self.descent.integrate_walls();
+            }
             let tolerance = if last { self.settings.tolerance } else { SPREAD_TOLERANCE };
             if let Some(stop) = self.newton(tolerance, progress)? {
                 return Ok(stop);

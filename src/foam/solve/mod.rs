@@ -199,11 +199,28 @@ impl System {
         damping: f64,
     ) -> Result<Step, FactorError> {
         let now = volumes(complex, places, reference);
+        let excess = now.iter().zip(targets).map(|(now, target)| now - target).collect();
+        self.step_by(complex, places, reference, pressures, &excess, damping)
+    }
+
+    /// As [`System::step`], with the volumes that the cells have too much.
+    ///
+    /// # Errors
+    /// As [`System::step`].
+    pub fn step_by(
+        &self,
+        complex: &Complex,
+        places: &Places,
+        reference: &Reference,
+        pressures: &IndexVec<RegionId, f64>,
+        excess: &IndexVec<RegionId, f64>,
+        damping: f64,
+    ) -> Result<Step, FactorError> {
         let motions = Motions::new(complex, places, &self.layout, &self.frames);
         let at = At { complex, places, reference, pressures, motions: &motions, frames: &self.frames };
         let assembled = self.assemble(&at);
         let walls = self.wall_entries(&at, &assembled);
-        let (rhs, residuals) = self.loads(complex, &assembled, &now, targets);
+        let (rhs, residuals) = self.loads(complex, &assembled, excess);
         let mut forces = rhs.clone();
         forces.pressures.iter_mut().for_each(|missing| *missing = 0.0);
         let mut solution = None;
@@ -261,8 +278,7 @@ impl System {
         &self,
         complex: &Complex,
         films: &[FilmHessian],
-        now: &IndexVec<RegionId, f64>,
-        targets: &IndexVec<RegionId, f64>,
+        excess: &IndexVec<RegionId, f64>,
     ) -> (Direction, Residuals) {
         let mut freedoms = vec![0.0; self.layout.of_freedom.len()];
         for (film, layout) in films.iter().zip(&self.layout.films) {
@@ -282,7 +298,7 @@ impl System {
         let pressures: IndexVec<RegionId, f64> = complex
             .regions
             .ids()
-            .map(|id| if self.is_cell(complex, id) { now[id] - targets[id] } else { 0.0 })
+            .map(|id| if self.is_cell(complex, id) { excess[id] } else { 0.0 })
             .collect();
         let most = |values: &[f64]| {
             values.iter().fold(0.0, |most: f64, x| if x.is_nan() { f64::NAN } else { most.max(x.abs()) })
