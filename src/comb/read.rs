@@ -154,7 +154,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let reaches: Vec<f64> = pitches.iter().map(|p| watershed::REACH * p).collect();
     let regions = walls::regions(&first, &relief, &centres, &pitches, &reaches);
     for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
-        if site.depth == 0 && region.area > 0.0 && region.on_border == 0 {
+        if site.depth == 0 && region.area > 0.0 && !region.on_border {
             *centre = region.centroid;
         }
     }
@@ -186,7 +186,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let centres = regions
         .iter()
         .zip(&markers)
-        .map(|(r, m)| if r.area > 0.0 && r.on_border == 0 { r.centroid } else { *m })
+        .map(|(r, m)| if r.area > 0.0 && !r.on_border { r.centroid } else { *m })
         .collect();
     Segmented { segmentation, relief, centres, markers, by_hand, pitches, regions, walls }
 }
@@ -211,9 +211,8 @@ fn halves(
         let (a, b) = *pair;
         let pitch = (pitches[a] + pitches[b]) / 2.0;
         let cell = pitch * pitch * 0.75_f64.sqrt();
-        let corner = |i: usize| {
-            sites[i].depth > 0 && regions[i].area < CORNER_AREA * cell && regions[i].on_border == 0
-        };
+        let corner =
+            |i: usize| sites[i].depth > 0 && regions[i].area < CORNER_AREA * cell && !regions[i].on_border;
         let halves = match (found(a), found(b)) {
             (true, true) => wall.length > 0.3 * pitch,
             (true, false) => corner(b),
@@ -241,7 +240,7 @@ fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
     let cut: Vec<bool> = regions
         .iter()
         .zip(&evidence)
-        .map(|(r, e)| r.area == 0.0 || (r.on_border > 0 && e.visible < 1.0) || r.on_nothing > 0)
+        .map(|(r, e)| r.area == 0.0 || (r.on_border && e.visible < 1.0) || r.on_nothing)
         .collect();
     let whole: Vec<bool> = cut.iter().map(|c| !c).collect();
     let mut kinds = kinds::classify(&centres, &pitches, &evidence, &whole);
