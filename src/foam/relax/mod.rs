@@ -240,6 +240,9 @@ const DAMPED: f64 = 0.9;
 /// alone will not settle.
 const SPREAD_FOR: usize = 30;
 
+/// How often crumpled films are laid anew before a run counts as stalled.
+const MOST_LAID_ANEW: usize = 3;
+
 struct Run<'a> {
     gap: &'a Gap,
     settings: &'a RelaxSettings,
@@ -247,6 +250,8 @@ struct Run<'a> {
     descent: Descent,
     residuals: Residuals,
     unstable: usize,
+    laid_anew: usize,
+    refined: bool,
 }
 
 /// Why Newton steps were halted.
@@ -260,7 +265,7 @@ impl<'a> Run<'a> {
     fn new(state: State, gap: &'a Gap, settings: &'a RelaxSettings) -> Result<Self, RelaxError> {
         let descent = state.descent(gap)?;
         let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
-        Ok(Self { gap, settings, state, descent, residuals, unstable: 0 })
+        Ok(Self { gap, settings, state, descent, residuals, unstable: 0, laid_anew: 0, refined: false })
     }
 
     /// Newton steps with T1s until the residual is below `tolerance`; `None` then, otherwise why it stopped.
@@ -306,6 +311,9 @@ impl<'a> Run<'a> {
             });
             let steps = self.state.steps;
             let Ok(descended) = descended else {
+                if self.lay_anew()? {
+                    continue;
+                }
                 return Ok(Some(Stop::Stalled { steps, residual: self.residuals.force }));
             };
             (self.residuals, self.unstable) = (descended.residuals, descended.unstable);
@@ -313,6 +321,7 @@ impl<'a> Run<'a> {
             match (descended.ending, halt) {
                 (Ending::Converged, _) => return Ok(None),
                 (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
+                (Ending::Stalled, _) if self.lay_anew()? => patience = steps + SPREAD_FOR,
                 (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
                 (Ending::Halted, Some(Halt::Flip)) => {
                     self.flip(&vanishing)?;
@@ -340,6 +349,22 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Films that crumpled on the way from a rough start are laid anew between vertices that were drawn apart; who touches
+    /// whom stays. Gives whether that was done: only on the coarse mesh, and not often.
+    fn lay_anew(&mut self) -> Result<bool, RelaxError> {
+        if self.laid_anew == MOST_LAID_ANEW || self.refined {
+            return Ok(false);
+        }
+        self.laid_anew += 1;
+        let state = &mut self.state;
+        state.follow_films();
+        topology::draw_apart(&mut state.network, self.gap);
+        state.places = state.strips.first_places(&state.network, self.gap)?;
+        state.pressures.iter_mut().for_each(|pressure| *pressure = 0.0);
+        self.descent = state.descent(self.gap)?;
+        Ok(true)
+    }
+
     /// Spreads the nodes evenly along the films. Gives the largest move.
     fn spread(&mut self) -> f64 {
         let mut places = self.state.places.clone();
@@ -356,6 +381,7 @@ impl<'a> Run<'a> {
         &mut self,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Stop, RelaxError> {
+        self.refined = true;
         let Strips { along, through } = self.settings.strips;
         let strips = Strips { along: along.max(self.state.strips.along), through };
         if self.state.strips != strips {
@@ -383,73 +409,4 @@ impl<'a> Run<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        foam::network::tests::hexagons,
-        surface::{LevelSet, Plane},
-    };
-    use glam::DVec3;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use std::sync::Arc;
-
-    const HEIGHT: f64 = 0.5;
-
-    fn crooked_hexagons() -> (Network, Gap) {
-        let mut network = hexagons(4, 4);
-        let [Some(x), Some(y), None] = network.period().0 else { panic!("a flat torus") };
-        let mut random = ChaCha8Rng::seed_from_u64(2);
-        let mut noise = || random.random_range(-0.1..0.1);
-        for vertex in network.vertices() {
-            let place = network.position(vertex) + DVec3::new(noise(), noise(), 0.0);
-            network.set_position(vertex, place);
-        }
-        let plane: Arc<dyn LevelSet> = Arc::new(Plane { periods: [x, y] });
-        (network, Gap::between(plane, [-0.5 * HEIGHT, 0.5 * HEIGHT]).unwrap())
-    }
-
-    #[test]
-    fn crooked_hexagons_become_the_hexagonal_foam() {
-        let (network, gap) = crooked_hexagons();
-        let mut last = 0.0;
-        let relaxed = relax(network, &gap, &RelaxSettings::default(), &mut |told| {
-            last = told.energy;
-            ControlFlow::Continue(())
-        })
-        .unwrap();
-        assert!(matches!(relaxed.stop, Stop::Converged { .. }), "{:?}", relaxed.stop);
-        assert_eq!(relaxed.unstable, 0);
-        // Films are flat: the energy of cells of area 1 is exact, h √(2√3) each.
-        let exact = 16.0 * HEIGHT * (2.0 * 3.0_f64.sqrt()).sqrt();
-        assert!((last - exact).abs() < 1e-12 * exact, "{last} {exact}");
-    }
-
-    #[test]
-    fn a_state_read_back_goes_on_to_the_same_foam() {
-        let (network, gap) = crooked_hexagons();
-        let settings = RelaxSettings::default();
-        let mut saved = None;
-        let stopped = relax(network, &gap, &settings, &mut |told| {
-            saved = Some(serde_json::to_string(told.state).unwrap());
-            ControlFlow::Break(())
-        })
-        .unwrap();
-        assert_eq!(stopped.stop, Stop::Interrupted { steps: 1 });
-        let read: State = serde_json::from_str(&saved.unwrap()).unwrap();
-        let go_on = |state| resume(state, &gap, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
-        let (a, b) = (go_on(stopped.state), go_on(read));
-        assert!(matches!(a.stop, Stop::Converged { .. }));
-        assert_eq!(a.state.places, b.state.places);
-    }
-
-    #[test]
-    fn shares_must_be_one_positive_number_for_each_cell() {
-        let (network, gap) = crooked_hexagons();
-        for shares in [vec![1.0; 3], vec![0.0; 16], vec![f64::NAN; 16]] {
-            let settings = RelaxSettings { shares: Some(shares), ..RelaxSettings::default() };
-            let refused = relax(network.clone(), &gap, &settings, &mut |_| ControlFlow::Continue(()));
-            assert!(matches!(refused, Err(RelaxError::Shares { .. })));
-        }
-    }
-}
+mod tests;
