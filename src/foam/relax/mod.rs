@@ -34,9 +34,6 @@ pub struct RelaxSettings {
     /// A film flips when its edge is shorter than this part of the cell width. Above 0.1 sound short edges flip; below 0.02
     /// Newton steps on the sliver are slow.
     pub flip_below: f64,
-    /// Whether the softest mode of a converged foam is computed: it takes about as long as ten steps.
-    #[serde(default)]
-    pub softest_mode: bool,
     /// Each cell's share of the gap's volume; equal ones if none are given.
     pub shares: Option<Vec<f64>>,
 }
@@ -49,7 +46,6 @@ impl Default for RelaxSettings {
             volume_tolerance: 1e-11,
             step_limit: 400,
             flip_below: 0.05,
-            softest_mode: false,
             shares: None,
         }
     }
@@ -109,9 +105,6 @@ pub struct Relaxed {
     pub residuals: Residuals,
     /// Directions of negative curvature at the end: 0 at a minimum.
     pub unstable: usize,
-    /// The lowest eigenvalue of the Hessian on the constraints at the end (see [`crate::foam::solve::Mode`]), where it was
-    /// converged and asked for.
-    pub softest: Option<f64>,
 }
 
 /// A relaxation that could not even start.
@@ -215,13 +208,15 @@ pub fn resume(
         Some(stop) => stop,
         None => run.finish(progress)?,
     };
-    let softest = match stop {
-        Stop::Converged { .. } if settings.softest_mode => {
-            run.descent.lowest_mode().ok().map(|mode| mode.eigenvalue)
-        }
-        _ => None,
-    };
-    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable, softest })
+    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable })
+}
+
+/// The lowest eigenvalue of the Hessian at constant volumes of a foam in balance; see [`super::solve::Mode`].
+///
+/// # Errors
+/// [`FactorError`] if the system cannot be factored.
+pub fn lowest_eigenvalue(state: &State, gap: &Gap) -> Result<f64, FactorError> {
+    Ok(state.descent(gap)?.lowest_mode()?.eigenvalue)
 }
 
 /// The residual at which the mesh is refined: T1s have ended there, and two more steps would converge the coarse mesh.
