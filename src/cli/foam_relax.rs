@@ -131,7 +131,7 @@ pub(super) fn run(
         ("seeds and partition", until_partition),
         ("relaxation", began.elapsed().as_secs_f64() - until_partition),
     ];
-    let made = Made::new(&job, gap, relaxed, keeper.record)?;
+    let made = Made::new(&job, gap, relaxed, keeper.record)?.with_lowest_eigenvalue(gap);
     write_all(&mut folder, &job, settings, gap, &made, Some(&start.seeds), seconds)?;
     bar.finish_and_clear();
     end(folder, &job, &made)
@@ -152,7 +152,7 @@ pub(super) fn resume(checkpoint: Checkpoint, mut settings: FoamSettings) -> Resu
     let mut keeper = Keeper::new(&job, &bar, Some(folder.target().join(CHECKPOINT)), record);
     let relaxed = keeper.relax(Begin::State(state), &gap)?;
     let seconds = vec![("relaxation, resumed", began.elapsed().as_secs_f64())];
-    let made = Made::new(&job, &gap, relaxed, keeper.record)?;
+    let made = Made::new(&job, &gap, relaxed, keeper.record)?.with_lowest_eigenvalue(&gap);
     write_all(&mut folder, &job, &settings, &gap, &made, None, seconds)?;
     bar.finish_and_clear();
     end(folder, &job, &made)
@@ -291,12 +291,22 @@ impl Made {
             newton_steps: state.steps,
             residual: relaxed.residuals.force,
             unstable_directions: relaxed.unstable,
-            lowest_eigenvalue: relaxed.softest,
+            lowest_eigenvalue: None,
             audit: audit(state, gap),
             psi6_of_seeds: job.psi6,
             ended: relaxed.stop,
         };
         Ok(Self { relaxed, record, figures, pattern, cells })
+    }
+}
+
+impl Made {
+    /// With the lowest eigenvalue of a converged foam, which takes about as long as some Newton steps.
+    pub(super) fn with_lowest_eigenvalue(mut self, gap: &Gap) -> Self {
+        if matches!(self.figures.ended, Stop::Converged { .. }) {
+            self.figures.lowest_eigenvalue = relax::lowest_eigenvalue(&self.relaxed.state, gap).ok();
+        }
+        self
     }
 }
 

@@ -65,6 +65,29 @@ pub fn round(network: &Network, edge: EdgeId) -> Vec<VertexId> {
     round
 }
 
+/// Passes that draw vertices apart, and how far each goes towards the mean of the neighbours: a tangle of a few vertices
+/// opens, and the rest of the foam keeps its shape.
+const PASSES: usize = 4;
+const PART: f64 = 0.5;
+
+/// Moves every vertex towards the mean of its neighbours, along the middle surface.
+pub fn draw_apart(network: &mut Network, gap: &Gap) {
+    for _ in 0..PASSES {
+        let moved: Vec<(VertexId, DVec3)> = network
+            .vertices()
+            .map(|vertex| {
+                let here = network.position(vertex);
+                let pull: DVec3 = network.outgoing(vertex).map(|side| network.edge_vector(side) / 3.0).sum();
+                let level = gap.middle().value(here);
+                (vertex, gap.middle().project(here + PART * pull, level).unwrap_or(here))
+            })
+            .collect();
+        for (vertex, place) in moved {
+            network.set_position(vertex, place);
+        }
+    }
+}
+
 /// Does the T1 of an edge: flips the network, turns the edge across the middle surface and lays the five
 /// films that meet it anew. Gives whether it was done; otherwise only the edge's threshold has changed.
 pub fn flip(state: &mut State, gap: &Gap, edge: EdgeId) -> bool {

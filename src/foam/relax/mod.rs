@@ -34,9 +34,6 @@ pub struct RelaxSettings {
     /// A film flips when its edge is shorter than this part of the cell width. Above 0.1 sound short edges flip; below 0.02
     /// Newton steps on the sliver are slow.
     pub flip_below: f64,
-    /// Whether the softest mode of a converged foam is computed: it takes about as long as ten steps.
-    #[serde(default)]
-    pub softest_mode: bool,
     /// Each cell's share of the gap's volume; equal ones if none are given.
     pub shares: Option<Vec<f64>>,
 }
@@ -49,7 +46,6 @@ impl Default for RelaxSettings {
             volume_tolerance: 1e-11,
             step_limit: 400,
             flip_below: 0.05,
-            softest_mode: false,
             shares: None,
         }
     }
@@ -109,9 +105,6 @@ pub struct Relaxed {
     pub residuals: Residuals,
     /// Directions of negative curvature at the end: 0 at a minimum.
     pub unstable: usize,
-    /// The lowest eigenvalue of the Hessian on the constraints at the end (see [`crate::foam::solve::Mode`]), where it was
-    /// converged and asked for.
-    pub softest: Option<f64>,
 }
 
 /// A relaxation that could not even start.
@@ -215,13 +208,15 @@ pub fn resume(
         Some(stop) => stop,
         None => run.finish(progress)?,
     };
-    let softest = match stop {
-        Stop::Converged { .. } if settings.softest_mode => {
-            run.descent.lowest_mode().ok().map(|mode| mode.eigenvalue)
-        }
-        _ => None,
-    };
-    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable, softest })
+    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable })
+}
+
+/// The lowest eigenvalue of the Hessian at constant volumes of a foam in balance; see [`super::solve::Mode`].
+///
+/// # Errors
+/// [`FactorError`] if the system cannot be factored.
+pub fn lowest_eigenvalue(state: &State, gap: &Gap) -> Result<f64, FactorError> {
+    Ok(state.descent(gap)?.lowest_mode()?.eigenvalue)
 }
 
 /// The residual at which the mesh is refined: T1s have ended there, and two more steps would converge the coarse mesh.
@@ -240,6 +235,9 @@ const DAMPED: f64 = 0.9;
 /// alone will not settle.
 const SPREAD_FOR: usize = 30;
 
+/// How often crumpled films are laid anew before a run counts as stalled.
+const MOST_LAID_ANEW: usize = 3;
+
 struct Run<'a> {
     gap: &'a Gap,
     settings: &'a RelaxSettings,
@@ -247,6 +245,8 @@ struct Run<'a> {
     descent: Descent,
     residuals: Residuals,
     unstable: usize,
+    laid_anew: usize,
+    refined: bool,
 }
 
 /// Why Newton steps were halted.
@@ -260,7 +260,7 @@ impl<'a> Run<'a> {
     fn new(state: State, gap: &'a Gap, settings: &'a RelaxSettings) -> Result<Self, RelaxError> {
         let descent = state.descent(gap)?;
         let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
-        Ok(Self { gap, settings, state, descent, residuals, unstable: 0 })
+        Ok(Self { gap, settings, state, descent, residuals, unstable: 0, laid_anew: 0, refined: false })
     }
 
     /// Newton steps with T1s until the residual is below `tolerance`; `None` then, otherwise why it stopped.
@@ -306,6 +306,9 @@ impl<'a> Run<'a> {
             });
             let steps = self.state.steps;
             let Ok(descended) = descended else {
+                if self.lay_anew()? {
+                    continue;
+                }
                 return Ok(Some(Stop::Stalled { steps, residual: self.residuals.force }));
             };
             (self.residuals, self.unstable) = (descended.residuals, descended.unstable);
@@ -313,6 +316,7 @@ impl<'a> Run<'a> {
             match (descended.ending, halt) {
                 (Ending::Converged, _) => return Ok(None),
                 (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
+                (Ending::Stalled, _) if self.lay_anew()? => patience = steps + SPREAD_FOR,
                 (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
                 (Ending::Halted, Some(Halt::Flip)) => {
                     self.flip(&vanishing)?;
@@ -340,6 +344,22 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Films that crumpled on the way from a rough start are laid anew between vertices that were drawn apart; who touches
+    /// whom stays. Gives whether that was done: only on the coarse mesh, and not often.
+    fn lay_anew(&mut self) -> Result<bool, RelaxError> {
+        if self.laid_anew == MOST_LAID_ANEW || self.refined {
+            return Ok(false);
+        }
+        self.laid_anew += 1;
+        let state = &mut self.state;
+        state.follow_films();
+        topology::draw_apart(&mut state.network, self.gap);
+        state.places = state.strips.first_places(&state.network, self.gap)?;
+        state.pressures.iter_mut().for_each(|pressure| *pressure = 0.0);
+        self.descent = state.descent(self.gap)?;
+        Ok(true)
+    }
+
     /// Spreads the nodes evenly along the films. Gives the largest move.
     fn spread(&mut self) -> f64 {
         let mut places = self.state.places.clone();
@@ -356,6 +376,7 @@ impl<'a> Run<'a> {
         &mut self,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Stop, RelaxError> {
+        self.refined = true;
         let Strips { along, through } = self.settings.strips;
         let strips = Strips { along: along.max(self.state.strips.along), through };
         if self.state.strips != strips {
@@ -383,73 +404,4 @@ impl<'a> Run<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        foam::network::tests::hexagons,
-        surface::{LevelSet, Plane},
-    };
-    use glam::DVec3;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use std::sync::Arc;
-
-    const HEIGHT: f64 = 0.5;
-
-    fn crooked_hexagons() -> (Network, Gap) {
-        let mut network = hexagons(4, 4);
-        let [Some(x), Some(y), None] = network.period().0 else { panic!("a flat torus") };
-        let mut random = ChaCha8Rng::seed_from_u64(2);
-        let mut noise = || random.random_range(-0.1..0.1);
-        for vertex in network.vertices() {
-            let place = network.position(vertex) + DVec3::new(noise(), noise(), 0.0);
-            network.set_position(vertex, place);
-        }
-        let plane: Arc<dyn LevelSet> = Arc::new(Plane { periods: [x, y] });
-        (network, Gap::between(plane, [-0.5 * HEIGHT, 0.5 * HEIGHT]).unwrap())
-    }
-
-    #[test]
-    fn crooked_hexagons_become_the_hexagonal_foam() {
-        let (network, gap) = crooked_hexagons();
-        let mut last = 0.0;
-        let relaxed = relax(network, &gap, &RelaxSettings::default(), &mut |told| {
-            last = told.energy;
-            ControlFlow::Continue(())
-        })
-        .unwrap();
-        assert!(matches!(relaxed.stop, Stop::Converged { .. }), "{:?}", relaxed.stop);
-        assert_eq!(relaxed.unstable, 0);
-        // Films are flat: the energy of cells of area 1 is exact, h √(2√3) each.
-        let exact = 16.0 * HEIGHT * (2.0 * 3.0_f64.sqrt()).sqrt();
-        assert!((last - exact).abs() < 1e-12 * exact, "{last} {exact}");
-    }
-
-    #[test]
-    fn a_state_read_back_goes_on_to_the_same_foam() {
-        let (network, gap) = crooked_hexagons();
-        let settings = RelaxSettings::default();
-        let mut saved = None;
-        let stopped = relax(network, &gap, &settings, &mut |told| {
-            saved = Some(serde_json::to_string(told.state).unwrap());
-            ControlFlow::Break(())
-        })
-        .unwrap();
-        assert_eq!(stopped.stop, Stop::Interrupted { steps: 1 });
-        let read: State = serde_json::from_str(&saved.unwrap()).unwrap();
-        let go_on = |state| resume(state, &gap, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
-        let (a, b) = (go_on(stopped.state), go_on(read));
-        assert!(matches!(a.stop, Stop::Converged { .. }));
-        assert_eq!(a.state.places, b.state.places);
-    }
-
-    #[test]
-    fn shares_must_be_one_positive_number_for_each_cell() {
-        let (network, gap) = crooked_hexagons();
-        for shares in [vec![1.0; 3], vec![0.0; 16], vec![f64::NAN; 16]] {
-            let settings = RelaxSettings { shares: Some(shares), ..RelaxSettings::default() };
-            let refused = relax(network.clone(), &gap, &settings, &mut |_| ControlFlow::Continue(()));
-            assert!(matches!(refused, Err(RelaxError::Shares { .. })));
-        }
-    }
-}
+mod tests;
