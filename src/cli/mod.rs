@@ -9,6 +9,7 @@
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
+//! | `compare` | `compare.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
@@ -17,6 +18,7 @@
 mod comb;
 mod comb_render;
 mod comb_score;
+mod compare;
 mod enclosure;
 mod foam;
 mod foam_batch;
@@ -49,6 +51,7 @@ enum Command {
     Foam(Box<foam::FoamArguments>),
     /// Read the cells of comb and their numbers of sides from photographs
     Comb(Box<comb::CombArguments>),
+    Compare(compare::CompareArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -63,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
         Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
+        Command::Compare(compare) => compare::run(&compare),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };
