@@ -34,8 +34,11 @@ const RELIEF_BLUR: f64 = 0.03;
 const HALVES_RISE: f64 = 0.55;
 const HALVES_AREA: f64 = 1.65;
 const HALVES_DISTANCE: f64 = 0.78;
-/// An inferred place with less than this share of a cell's area is a corner of another one's cell.
-const CORNER_AREA: f64 = 0.2;
+/// An inferred place is a corner of another one's cell behind no more than a sunken wall: less than this share of a cell,
+/// no more than this together with the other, and a wall of no more than this share of the usual rise.
+const CORNER_AREA: f64 = 0.5;
+const CORNER_TOTAL: f64 = 1.4;
+const CORNER_RISE: f64 = 0.8;
 
 /// A cell that the border cuts is a sliver if less than this share of its outline is seen.
 const HALF_SEEN: f64 = 0.5;
@@ -219,8 +222,10 @@ fn halves(
             (false, true) => corner(a),
             (false, false) => false,
         };
-        let open = rise(*pair, wall) < HALVES_RISE * typical;
-        let sized = regions[a].area + regions[b].area < HALVES_AREA * cell;
+        let both = found(a) && found(b);
+        let (rise_limit, area) = if both { (HALVES_RISE, HALVES_AREA) } else { (CORNER_RISE, CORNER_TOTAL) };
+        let open = rise(*pair, wall) < rise_limit * typical;
+        let sized = regions[a].area + regions[b].area < area * cell;
         let close = regions[a].centroid.distance(regions[b].centroid) < HALVES_DISTANCE * pitch;
         if halves && open && sized && close && !joined[a] && !joined[b] {
             let (kept, gone) = if found(a) { (a, b) } else { (b, a) };
