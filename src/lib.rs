@@ -18,6 +18,7 @@
 
 pub mod comb;
 pub mod enclosure;
+pub mod evolver;
 pub mod foam;
 pub mod index;
 pub mod mesh;

@@ -8,6 +8,7 @@
 //! | `enclosure` | `enclosure.rs` |
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
+//! | `evolver check`, `evolver run` | `evolver.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
@@ -18,6 +19,7 @@ mod comb;
 mod comb_render;
 mod comb_score;
 mod enclosure;
+mod evolver;
 mod foam;
 mod foam_batch;
 mod foam_relax;
@@ -49,6 +51,8 @@ enum Command {
     Foam(Box<foam::FoamArguments>),
     /// Read the cells of comb and their numbers of sides from photographs
     Comb(Box<comb::CombArguments>),
+    /// Read, check and run datafiles of Surface Evolver
+    Evolver(evolver::EvolverArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -63,6 +67,7 @@ pub fn main() -> ExitCode {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
         Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
+        Command::Evolver(arguments) => evolver::run(&arguments),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };

@@ -14,6 +14,7 @@ mod layout;
 mod motion;
 mod rigid;
 mod sparse;
+pub(crate) mod symmetric;
 
 pub use sparse::FactorError;
 
