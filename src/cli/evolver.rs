@@ -85,17 +85,17 @@ fn ended(error: EvolverError) -> CliError {
 
 fn check(file: &Path) -> Result<(), CliError> {
     let document = Document::new(&open(file).map_err(ended)?).map_err(ended)?;
-    print!("{}", summary(&document));
+    out(&summary(&document));
     let name = file.display();
     for fault in &document.faults {
         let grave = if fault.is_grave() { "error" } else { "note" };
-        println!("{grave}: {name}: line {}: {fault}", fault.position().line);
+        out(&format!("{grave}: {name}: line {}: {fault}\n", fault.position().line));
     }
     let grave = document.faults.iter().filter(|fault| fault.is_grave()).count();
     if grave > 0 {
         return Err(CliError::mistake(anyhow!("{name} has {grave} error(s)")));
     }
-    println!("no errors");
+    out("no errors\n");
     Ok(())
 }
 
@@ -149,6 +149,11 @@ fn summary(document: &Document) -> String {
     text
 }
 
+/// Prints. Whoever reads may stop reading; the surface is computed all the same.
+fn out(text: &str) {
+    let _ = io::stdout().write_all(text.as_bytes());
+}
+
 /// Output of commands to the terminal, files to a folder.
 struct Terminal {
     folder: PathBuf,
@@ -156,8 +161,7 @@ struct Terminal {
 
 impl Host for Terminal {
     fn print(&mut self, text: &str) {
-        // Whoever reads may stop reading; the surface is computed all the same.
-        let _ = io::stdout().write_all(text.as_bytes());
+        out(text);
     }
 
     fn write(&mut self, name: &str, text: &str, append: bool) -> Result<(), io::Error> {
@@ -177,7 +181,7 @@ fn run_file(arguments: &RunArguments) -> Result<(), CliError> {
     let name = arguments.file.display().to_string();
     if arguments.fix {
         for (body, face) in document.turn_faces().map_err(ended)? {
-            println!("fixed: face {face} turned round in body {body}");
+            out(&format!("fixed: face {face} turned round in body {body}\n"));
         }
     }
     if !arguments.as_printed
@@ -200,7 +204,7 @@ fn run_file(arguments: &RunArguments) -> Result<(), CliError> {
         save_interrupted(&mut session, &mut host, &error);
         return Err(ended(error));
     }
-    print!("{}", table(&mut session).map_err(ended)?);
+    out(&table(&mut session).map_err(ended)?);
     if arguments.output.is_some() {
         let text = session.datafile().map_err(ended)?;
         host.write("final.fe", &text, false).map_err(CliError::failure)?;

@@ -23,8 +23,8 @@ const TOGGLES: [&str; 46] = [
 ];
 
 /// Commands of the display: there is none here.
-const DISPLAY: [&str; 13] = [
-    "s", "p", "show", "showq", "show_off", "geomview", "postscript", "zoom", "view_matrix", "transform_expr", "binary_off",
+const DISPLAY: [&str; 11] = [
+    "show", "showq", "show_off", "geomview", "postscript", "zoom", "view_matrix", "transform_expr", "binary_off",
     "ps_colorflag", "geompipe",
 ];
 
@@ -105,7 +105,6 @@ fn letter(cursor: &mut Cursor, letter: &str) -> Option<Parsed> {
 
 /// The command that begins with `word`, in lower case.
 pub(super) fn action(cursor: &mut Cursor, word: &str) -> Parsed {
-    let position = cursor.position();
     if let TokenKind::Word(raw) = cursor.kind().clone()
         && raw.chars().count() == 1
     {
@@ -116,7 +115,9 @@ pub(super) fn action(cursor: &mut Cursor, word: &str) -> Parsed {
         cursor.rewind(cursor.mark() - 1);
     }
     if let Some((_, hint)) = REFUSED.iter().find(|(name, _)| *name == word) {
-        return cursor.unsupported(position, word, hint);
+        cursor.bump();
+        skip_statement(cursor);
+        return Ok(Action::Refused(word.into(), hint));
     }
     cursor.bump();
     if let Some(parsed) = element_command(cursor, word) {
@@ -129,9 +130,7 @@ pub(super) fn action(cursor: &mut Cursor, word: &str) -> Parsed {
         return Ok(Action::Toggle(word.into(), on_or_off(cursor)));
     }
     if DISPLAY.contains(&word) {
-        while !cursor.at_end() && !cursor.token().first_on_line && !cursor.is_symbol(";") && !cursor.is_symbol("}") {
-            cursor.bump();
-        }
+        skip_statement(cursor);
         return Ok(Action::Simple(Simple::Nothing));
     }
     // A procedure's name stands alone; anything else is an expression whose value is shown.
@@ -142,6 +141,22 @@ pub(super) fn action(cursor: &mut Cursor, word: &str) -> Parsed {
     }
     cursor.rewind(cursor.mark() - 1);
     Ok(Action::Show(cursor.expression()?))
+}
+
+/// Goes to the end of a statement, brackets and all.
+fn skip_statement(cursor: &mut Cursor) {
+    let mut depth = 0_usize;
+    while !cursor.at_end() {
+        match cursor.kind() {
+            TokenKind::Symbol("{" | "(" | "[") => depth += 1,
+            TokenKind::Symbol("}" | ")" | "]") if depth == 0 => return,
+            TokenKind::Symbol("}" | ")" | "]") => depth -= 1,
+            TokenKind::Symbol(";") if depth == 0 => return,
+            _ if depth == 0 && cursor.token().first_on_line => return,
+            _ => {}
+        }
+        cursor.bump();
+    }
 }
 
 fn on_or_off(cursor: &mut Cursor) -> Option<bool> {

@@ -209,8 +209,10 @@ pub enum Action {
     Toggle(Arc<str>, Option<bool>),
     /// `define vertex attribute …`.
     DefineAttribute(ExtraAttribute),
-    /// Several `list topinfo`-like commands.
+    /// `list` of something other than elements: nothing here.
     ListInformation(Arc<str>),
+    /// A command that is not supported: its name and the nearest way to do it. It is an error where it runs.
+    Refused(Arc<str>, &'static str),
 }
 
 /// The rest of `define facet attribute name real[3]` behind the kind.

@@ -3,7 +3,10 @@
 use super::{Action, Assignment, Simple, Statement};
 use crate::evolver::{
     error::EvolverError,
-    language::{Cursor, TokenKind, expression::Expression},
+    language::{
+        Cursor, TokenKind,
+        expression::{ElementKind, Expression},
+    },
 };
 use std::sync::Arc;
 
@@ -191,6 +194,16 @@ fn assignment_operator(cursor: &Cursor) -> Option<Assignment> {
     })
 }
 
+/// Whether a command on elements stands where a value could: `cells := show facet where …`.
+fn starts_command(cursor: &Cursor) -> bool {
+    let known = ["show", "list", "set", "unset", "refine", "delete", "fix", "unfix", "foreach"];
+    let kind = match &cursor.ahead(1).kind {
+        TokenKind::Word(word) => ElementKind::named(&word.to_lowercase()),
+        _ => None,
+    };
+    kind.is_some() && cursor.word().is_some_and(|word| known.contains(&word.as_str()))
+}
+
 /// An assignment, if one begins here.
 fn assignment(cursor: &mut Cursor) -> Result<Option<Action>, EvolverError> {
     let follows = match cursor.ahead(1).kind {
@@ -217,6 +230,10 @@ fn assignment(cursor: &mut Cursor) -> Result<Option<Action>, EvolverError> {
         let position = cursor.position();
         let action = block(cursor)?;
         return Ok(Some(Action::Define(name.clone(), Arc::new(Statement { position, action }))));
+    }
+    if operator == Assignment::Set && starts_command(cursor) {
+        let body = statement(cursor)?;
+        return Ok(Some(Action::Define(name.clone(), Arc::new(body))));
     }
     let value = cursor.expression()?;
     if matches!(value, Expression::Text(_)) || matches!(&value, Expression::Call(name, _, _) if &**name == "sprintf") {

@@ -9,11 +9,11 @@ use crate::evolver::{
 use glam::DMat3;
 
 /// Settings of a word and a number that change nothing here.
-const IGNORED_NUMBERS: [&str; 26] = [
+const IGNORED_NUMBERS: [&str; 27] = [
     "vertices_predicted", "edges_predicted", "facets_predicted", "facetedges_predicted", "bodies_predicted",
     "quantities_predicted", "method_instances_predicted", "evolver_version", "total_time", "zoom_vertex",
     "zoom_radius", "tolerance", "constraint_tolerance", "target_tolerance", "runge_kutta_flag", "jiggle_temperature", "temperature",
-    "scrollscale", "linewidth", "thickness", "hessian_epsilon", "brightness", "clip_coeff", "merit_factor",
+    "scrollscale", "linewidth", "thickness", "hessian_epsilon", "brightness", "clip_coeff", "slice_coeff", "merit_factor",
     "area_weighting", "pickvnum",
 ];
 
@@ -185,7 +185,12 @@ impl Reader {
         if IGNORED_NUMBERS.contains(&word) {
             self.cursor.accept(":");
             self.cursor.accept("=");
-            if matches!(self.cursor.kind(), TokenKind::Text(_)) {
+            if self.cursor.accept("{") {
+                while !self.cursor.accept("}") {
+                    self.number()?;
+                    self.cursor.accept(",");
+                }
+            } else if matches!(self.cursor.kind(), TokenKind::Text(_)) {
                 self.cursor.bump();
             } else {
                 self.number()?;

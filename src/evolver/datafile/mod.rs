@@ -374,7 +374,7 @@ impl Datafile {
             extra_attributes: Vec::new(),
             gravity: true,
             symmetric_content: false,
-            gap_constant: 0.0,
+            gap_constant: 1.0,
             edge_points: None,
             scale: None,
             scale_limit: None,
@@ -404,7 +404,13 @@ impl Reader {
             space,
             dimension: if space == Space::Parameters { 3 } else { self.data.dimension },
         };
-        Formula::new(expression, &names).map_err(|error| no_formula(&self.cursor, error, position))
+        Formula::new(expression, &names).map_err(|mut error| {
+            let attribute = |extra: &ExtraAttribute| error.message == format!("«{}» is not defined", extra.name);
+            if self.data.extra_attributes.iter().any(attribute) {
+                error = NoFormula { message: "an added attribute inside a formula".to_owned(), unsupported: true, ..error };
+            }
+            no_formula(&self.cursor, error, position)
+        })
     }
 
     /// A formula up to where the next thing must begin.

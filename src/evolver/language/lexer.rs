@@ -33,10 +33,10 @@ pub(crate) struct Token {
 }
 
 /// All operators, the longest first.
-const SYMBOLS: [&str; 40] = [
+const SYMBOLS: [&str; 41] = [
     "::=", ":=", "+=", "-=", "*=", "/=", "==", "!=", "<=", ">=", "&&", "||", ">>", "<<", "**", "->", "(", ")",
     "[", "]", "{", "}", ",", ";", ":", "?", "+", "-", "*", "/", "%", "^", "=", "<", ">", "!", ".", "|", "@",
-    "#",
+    "#", "'",
 ];
 
 /// How deep macros may use macros, and how many tokens they may make: enough for any file written by hand.

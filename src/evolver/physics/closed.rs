@@ -84,8 +84,10 @@ pub(crate) fn closed_volumes(problem: &Problem, surface: &Surface, places: &Plac
         .bodies
         .ids()
         .map(|body| {
-            let volume = all[RegionId::from_index(body.index() + 1)] + 0.0;
-            (closable[body.index()] && volume.is_finite()).then_some(volume)
+            let volume = all[RegionId::from_index(body.index() + 1)];
+            // A patch is taken as a disc round the body's foot on the wall: a body that goes round the outside of its contact
+            // line comes out inside out, and cannot be judged this way.
+            (closable[body.index()] && volume > 0.0).then_some(volume)
         })
         .collect()
 }

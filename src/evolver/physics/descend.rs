@@ -54,7 +54,7 @@ pub(crate) struct Descended {
     pub(crate) stuck: bool,
 }
 
-/// The relative error of a functional at which restoring stops: Surface Evolver's.
+/// The sum of the functionals' errors at which restoring stops: Surface Evolver's, absolute as there.
 const TARGET_TOLERANCE: f64 = 1e-4;
 /// Restoring steps before giving up.
 const RESTORATIONS: usize = 10;
@@ -139,7 +139,7 @@ impl Restoring {
         pattern.factor(&self.values).and_then(|factor| factor.solve(wanted)).map_err(singular)
     }
 
-    /// What is missing from the targets, and the sum of the relative errors in units of the tolerance.
+    /// What is missing from the targets, and the sum of the errors in units of the tolerance.
     fn missing(&self, problem: &Problem, values: &Values) -> (Vec<f64>, f64) {
         let mut error = 0.0;
         let missing = self
@@ -148,8 +148,7 @@ impl Restoring {
             .map(|&id| {
                 let target = problem.functionals()[id].target.unwrap_or(0.0);
                 let missing = target - values.functionals[id];
-                let size = if target.abs() > 0.0 { target.abs() } else { 1.0 };
-                error += missing.abs() / (TARGET_TOLERANCE * size);
+                error += missing.abs() / TARGET_TOLERANCE;
                 missing
             })
             .collect();
@@ -264,8 +263,21 @@ impl Problem {
         let (force, multipliers) = self.force(state, &gradients, &restoring)?;
         let direction = descent.direction(force);
         let trial = Trial { problem: self, state, direction: &direction, restoring: &restoring };
-        let (scale, stuck) = if descent.fixed { (descent.scale, false) } else { trial.optimum(descent)? };
-        let (moved, values) = trial.at(scale, true)?;
+        let (mut scale, mut stuck) = (descent.scale, false);
+        let (moved, values) = if descent.fixed {
+            trial.at(scale, true)?
+        } else {
+            let found = trial.optimum(descent)?;
+            (scale, stuck) = (found.scale, found.stuck);
+            let best = trial.at(scale, true)?;
+            if best.1.energy > found.energy {
+                // The parabola missed: the scale that is known to lower the energy.
+                scale = found.lowering;
+                trial.at(scale, true)?
+            } else {
+                best
+            }
+        };
         if !values.energy.is_finite() {
             let message = "the step gives no finite energy; the surface stays where it was".to_owned();
             return Err(EvolverError::Numerical(message));
@@ -327,8 +339,8 @@ impl Trial<'_> {
         Ok(if energy.is_finite() { energy } else { f64::MAX })
     }
 
-    /// The scale of least energy, and whether no scale lowers it.
-    fn optimum(&self, descent: &Descent) -> Result<(f64, bool), EvolverError> {
+    /// The scale of least energy by three trials and a parabola.
+    fn optimum(&self, descent: &Descent) -> Result<Optimum, EvolverError> {
         let limit = descent.limit;
         let mut scale = descent.scale.min(limit);
         if scale <= 0.0 {
@@ -352,22 +364,30 @@ impl Trial<'_> {
             while e_first >= e_zero {
                 tries += 1;
                 if tries > HALVINGS || scale < 1e-12 * limit {
-                    return Ok((0.0, true));
+                    return Ok(Optimum { scale: 0.0, stuck: true, energy: e_zero, lowering: 0.0 });
                 }
                 (second, e_second) = (first, e_first);
                 scale *= 0.5;
                 (first, e_first) = (scale, self.energy(scale)?);
             }
         }
-        if scale > limit {
-            return Ok((limit, false));
+        if scale < limit {
+            let denominator = e_zero * (first - second) + e_first * second - e_second * first;
+            let numerator = (e_zero - e_second) * first * first + (e_first - e_zero) * second * second;
+            let parabola = 0.5 * numerator / denominator;
+            scale = if parabola.is_finite() { parabola.max(0.0) } else { first };
         }
-        let denominator = e_zero * (first - second) + e_first * second - e_second * first;
-        if denominator.abs() > 0.0 {
-            scale = 0.5 * ((e_zero - e_second) * first * first + (e_first - e_zero) * second * second) / denominator;
-        }
-        // A parabola that misses its own lowest trial is of no use.
-        let best = if scale.is_finite() && scale > 0.0 && self.energy(scale)? <= e_first { scale } else { first };
-        Ok((best.min(limit), false))
+        Ok(Optimum { scale: scale.min(limit), stuck: false, energy: e_zero, lowering: first })
     }
+}
+
+/// What trials along a direction have found.
+struct Optimum {
+    scale: f64,
+    /// Whether no scale lowers the energy.
+    stuck: bool,
+    /// The energy without a step.
+    energy: f64,
+    /// A scale that lowers it.
+    lowering: f64,
 }

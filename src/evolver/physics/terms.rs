@@ -239,8 +239,7 @@ impl Collector<'_> {
             if let Some(energy) = energy {
                 let field = EdgePart::Field(EdgeField::Along(self.vector(energy)));
                 let field = self.edge_field(field);
-                for (id, edge) in self.surface.edges.enumerated().filter(|(_, edge)| on(&edge.common)) {
-                    let _ = edge;
+                for (id, _) in self.surface.edges.enumerated().filter(|(_, edge)| on(&edge.common)) {
                     let part = Part { field, destination: Destination::Energy, weight: 1.0, offset: DVec3::ZERO };
                     self.edge_parts[id.index()].push(part);
                 }
@@ -248,9 +247,11 @@ impl Collector<'_> {
             if let Some(content) = content {
                 let field = EdgePart::Field(EdgeField::Along(self.vector(content)));
                 let field = self.edge_field(field);
+                // Surface Evolver takes the contents of boundaries with the other sign.
+                let sign = if at < of_constraints { 1.0 } else { -1.0 };
                 for (id, edge) in self.surface.edges.enumerated().filter(|(_, edge)| on(&edge.common)) {
                     if !edge.noncontent {
-                        self.edge_content(id, field);
+                        self.edge_content(id, field, sign);
                     }
                 }
             }
@@ -259,13 +260,13 @@ impl Collector<'_> {
     }
 
     /// The content of an edge goes to the bodies of its facets, in the sense in which each facet runs along it.
-    fn edge_content(&mut self, edge: EdgeId, field: u32) {
+    fn edge_content(&mut self, edge: EdgeId, field: u32, factor: f64) {
         for &(facet, at) in &self.neighbours.facets[edge] {
             let facet = &self.surface.facets[facet];
             if facet.noncontent {
                 continue;
             }
-            let along = if facet.edges[at].reversed { -1.0 } else { 1.0 };
+            let along = if facet.edges[at].reversed { -factor } else { factor };
             for (side, sign) in SIGNS.into_iter().enumerate() {
                 let Some(body) = facet.bodies[side] else { continue };
                 let destination = Destination::Functional(FunctionalId::from_index(body.index()));

@@ -11,7 +11,7 @@ use crate::{
         error::EvolverError,
         language::expression::{ElementKind, Expression, Query},
         source::Position,
-        surface::{Averaging, BodyId, BoundaryId, Common, ConstraintId, EdgeId, FacetId, Surface, VertexId},
+        surface::{BodyId, BoundaryId, Common, ConstraintId, EdgeId, FacetId, Surface, VertexId},
     },
     index::Id,
 };
@@ -79,7 +79,7 @@ impl Session {
             }
             (ElementCommand::Average, Some(ElementKind::Vertex)) => {
                 let chosen: Vec<VertexId> = elements.iter().map(|e| VertexId::from_index(e.index)).collect();
-                self.surface.average(Averaging::KeepVolume, Some(&chosen));
+                self.average(Some(&chosen))?;
                 chosen.len()
             }
             (ElementCommand::Equiangulate | ElementCommand::Edgeswap, Some(ElementKind::Edge)) => {

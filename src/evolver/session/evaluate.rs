@@ -59,6 +59,16 @@ impl Scope {
         self.entries.pop();
     }
 
+    pub(super) fn unsupported<T>(&self, position: Position, what: &str, hint: &str) -> Result<T, EvolverError> {
+        match &self.source {
+            Some(source) => {
+                let place = Place { source: source.clone(), position };
+                Err(EvolverError::Unsupported { what: what.to_owned(), place, hint: hint.to_owned() })
+            }
+            None => Err(EvolverError::Surface(format!("not supported: {what}"))),
+        }
+    }
+
     pub(super) fn fail<T>(&self, position: Position, message: impl Into<String>) -> Result<T, EvolverError> {
         let message = message.into();
         match &self.source {

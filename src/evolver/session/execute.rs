@@ -288,6 +288,7 @@ impl Session {
             }
             Action::Histogram(query, value, _) => self.histogram(query, value, scope, host),
             Action::ListInformation(_) => Ok(()),
+            Action::Refused(what, hint) => scope.unsupported(position, what, hint),
             Action::Set(query, name, index, value) => self.set(query, name, (index.as_ref(), value.as_ref()), position, scope),
             Action::Unset(query, name, value) => self.unset(query, name, value.as_ref(), position, scope),
             Action::Elements(command, target) => self.element_command(*command, target, scope, host),

@@ -1,7 +1,7 @@
 //! Commands that move or refine the surface, and what they report.
 
 use super::{
-    Host, Session,
+    Current, Host, Session,
     evaluate::Scope,
     format::significant,
 };
@@ -17,7 +17,7 @@ use crate::{
             newton::Newton,
         },
         source::Position,
-        surface::{Averaging, EdgeId, FacetId},
+        surface::{EdgeId, FacetId, VertexId},
     },
     index::{Id, IndexVec},
 };
@@ -64,9 +64,7 @@ impl Session {
                 self.say(host, &format!("Edges swapped in equiangulation: {count}\n"));
             }
             Simple::Average => {
-                self.surface.average(Averaging::KeepVolume, None);
-                self.changed();
-                self.current()?;
+                self.average(None)?;
                 self.say(host, "Vertex averaging done.\n");
             }
             Simple::Volumes => self.volumes(host)?,
@@ -110,6 +108,16 @@ impl Session {
             "hessian_normal" => self.normal = new(self.normal),
             _ => {}
         }
+    }
+
+    /// `V`: averages vertices, all or some.
+    pub(super) fn average(&mut self, only: Option<&[VertexId]>) -> Done {
+        self.current()?;
+        let Some(Current { problem, state, .. }) = self.problem.take() else { return Ok(()) };
+        self.surface.average(only, &|vertex, step| problem.projected(&state, vertex, step));
+        self.changed();
+        self.current()?;
+        Ok(())
     }
 
     fn say(&self, host: &mut dyn Host, text: &str) {

@@ -4,12 +4,8 @@ use super::{Directed, EdgeId, FacetId, Neighbours, Surface, VertexId};
 use crate::{evolver::datafile::{Model, Representation}, index::Id};
 use glam::DVec3;
 
-/// How a vertex is averaged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Averaging {
-    /// Within the surface, so that volumes stay to first order.
-    KeepVolume,
-}
+/// The part of the way to the mean that a vertex goes: less than the whole, so that neighbours do not swing past each other.
+const STEP: f64 = 0.25;
 
 /// The sum of cosines below which an edge is swapped; a little below zero so that equal squares do not swap for ever.
 const SWAP: f64 = -0.001;
@@ -120,9 +116,9 @@ impl Surface {
         true
     }
 
-    /// Moves every free vertex towards the mean of its neighbours, within the surface. Vertices on constraints are to be
-    /// brought back by the caller.
-    pub(crate) fn average(&mut self, averaging: Averaging, only: Option<&[VertexId]>) {
+    /// Moves every free vertex towards the mean of its neighbours, within the surface and, by `tangent`, along its
+    /// constraints. The caller brings vertices back onto bent ones.
+    pub(crate) fn average(&mut self, only: Option<&[VertexId]>, tangent: &dyn Fn(VertexId, DVec3) -> DVec3) {
         let neighbours = self.neighbours();
         let areas: Vec<f64> = self.facets.ids().map(|id| self.area_vector(id).length()).collect();
         let chosen = |id: VertexId| only.is_none_or(|only| only.contains(&id));
@@ -130,7 +126,7 @@ impl Surface {
             .vertices
             .ids()
             .filter(|&id| chosen(id) && !self.vertices[id].middle)
-            .filter_map(|id| self.averaged(id, &neighbours, &areas, averaging).map(|step| (id, step)))
+            .filter_map(|id| self.averaged(id, &neighbours, &areas, tangent).map(|step| (id, step)))
             .collect();
         let mut steps = vec![DVec3::ZERO; self.vertices.len()];
         for (id, step) in moved {
@@ -168,9 +164,8 @@ impl Surface {
         id: VertexId,
         neighbours: &Neighbours,
         areas: &[f64],
-        averaging: Averaging,
+        tangent: &dyn Fn(VertexId, DVec3) -> DVec3,
     ) -> Option<DVec3> {
-        let Averaging::KeepVolume = averaging;
         let vertex = &self.vertices[id];
         if vertex.common.fixed || vertex.common.boundary.is_some() {
             return None;
@@ -211,8 +206,13 @@ impl Surface {
             return None;
         }
         let normals = self.normals_at(id, neighbours, &taken)?;
-        let within = normals.iter().fold(sum, |rest, &n| rest - rest.dot(n) * n);
-        Some(0.25 / total * within)
+        let within = |v: DVec3| normals.iter().fold(v, |rest, &n| rest - rest.dot(n) * n);
+        let step = if vertex.common.constraints.is_empty() {
+            within(sum)
+        } else {
+            tangent(id, within(tangent(id, sum)))
+        };
+        Some(STEP / total * step)
     }
 
     /// The normals along which an averaged vertex must not move; `None` where it must not move at all.

@@ -21,7 +21,6 @@ mod refine;
 
 pub use check::{Fault, check};
 pub(crate) use images::body_images;
-pub(crate) use improve::Averaging;
 pub(crate) use neighbours::Neighbours;
 
 use super::datafile::{ExtraAttribute, Model, Representation};
