@@ -9,6 +9,7 @@ use super::{
 use crate::{
     evolver::write::foam_datafile,
     foam::{
+        audit::{Audit, audit},
         checkpoint::{Checkpoint, StepRecord},
         energy::energy,
         flat_hexagonal_energy,
@@ -90,6 +91,10 @@ pub(super) struct Figures {
     pub(super) residual: f64,
     /// Directions of negative curvature: 0 at a minimum.
     pub(super) unstable_directions: usize,
+    /// The lowest eigenvalue of the Hessian at constant volumes.
+    lowest_eigenvalue: Option<f64>,
+    /// Pressures against sides and curvature, cell by cell.
+    audit: Audit,
     psi6_of_seeds: f64,
     #[serde(flatten)]
     pub(super) ended: Stop,
@@ -287,6 +292,8 @@ impl Made {
             newton_steps: state.steps,
             residual: relaxed.residuals.force,
             unstable_directions: relaxed.unstable,
+            lowest_eigenvalue: relaxed.softest,
+            audit: audit(state, gap),
             psi6_of_seeds: job.psi6,
             ended: relaxed.stop,
         };
@@ -380,6 +387,17 @@ fn end(folder: OutputFolder, job: &Job, made: &Made) -> Result<(), CliError> {
     }
 }
 
+/// The audit in one line: how well pressures agree with sides and curvature.
+fn audit_in_words(audit: &Audit) -> String {
+    match audit.correlation {
+        Some(correlation) => format!(
+            "correlation {correlation:.6} (rms difference {:.1e} of {:.1e})",
+            audit.rms_difference, audit.rms_signal
+        ),
+        None => format!("all cells alike, rms difference {:.1e}", audit.rms_difference),
+    }
+}
+
 fn table(figures: &Figures) -> Vec<Line> {
     vec![
         ("space", figures.space.clone()),
@@ -395,5 +413,10 @@ fn table(figures: &Figures) -> Vec<Line> {
         ("T1s", figures.t1_count.to_string()),
         ("residual", format!("{:.1e}", figures.residual)),
         ("unstable directions", figures.unstable_directions.to_string()),
+        (
+            "lowest eigenvalue",
+            figures.lowest_eigenvalue.map_or("-".to_owned(), |value| format!("{value:.2e}")),
+        ),
+        ("law of the thin limit", audit_in_words(&figures.audit)),
     ]
 }

@@ -10,6 +10,7 @@
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `evolver check`, `evolver run` | `evolver.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
+//! | `compare` | `compare.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
@@ -18,6 +19,7 @@
 mod comb;
 mod comb_render;
 mod comb_score;
+mod compare;
 mod enclosure;
 mod evolver;
 mod foam;
@@ -53,6 +55,7 @@ enum Command {
     Comb(Box<comb::CombArguments>),
     /// Read, check and run datafiles of Surface Evolver
     Evolver(evolver::EvolverArguments),
+    Compare(compare::CompareArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -68,6 +71,7 @@ pub fn main() -> ExitCode {
         Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
         Command::Evolver(arguments) => evolver::run(&arguments),
+        Command::Compare(compare) => compare::run(&compare),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };

@@ -12,9 +12,13 @@
 //! | a relaxed foam as polygons, and for ParaView and viewers | `foam_surface.rs`, `foam_export.rs` |
 //! | the foam's picture, charts and tables; a partition's cells | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
+//! | a comparison's charts, tables and files | `compare_charts.rs`, `compare_map.rs`, `compare_files.rs` |
 
 pub mod comb;
 mod comb_overlay;
+pub mod compare_charts;
+pub mod compare_files;
+pub mod compare_map;
 pub mod enclosure;
 pub mod enclosure_drawing;
 pub mod enclosure_section;

@@ -8,7 +8,7 @@ mod shape;
 mod strips;
 
 pub use shape::Shape;
-pub(crate) use shape::{CurvePoint, ShapePoint, curve_points};
+pub(crate) use shape::{CurvePoint, MOST_NODES, ShapePoint, curve_points};
 pub use strips::{NoExtrusion, Strips};
 
 use crate::{
@@ -54,14 +54,15 @@ pub struct RegionImage {
 }
 
 /// How a node may move besides staying on its walls. The motion along a film or border changes only the mesh, so it is
-/// slaved to the nodes that bound the film: without that, discrete energies have spurious unstable modes.
+/// slaved to other nodes: without that, discrete energies have spurious unstable modes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Motion {
     /// In every direction.
     Free,
     /// A node of a border: moves with its masters, by weights, and on its own across the border's tangent.
     Border(Vec<(NodeId, f64)>),
-    /// A node inside a film: moves with its masters, by weights, and on its own along the film's normal.
+    /// A node inside a film: moves with its masters, by weights, and on its own along the film's normal. Masters are free
+    /// nodes, border nodes, or inner nodes of the same film that do not follow this one; the weights sum to 1.
     Inner(Vec<(NodeId, f64)>),
 }
 

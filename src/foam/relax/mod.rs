@@ -4,26 +4,26 @@
 //! and Newton steps to the end. Between steps nodes are spread evenly along the films and the wall patches integrated anew.
 //! How it ended is data ([`Stop`]); a run that cannot go on gives back the last good state.
 
+mod descend;
 mod state;
 
-pub(crate) use state::Derived;
+pub use descend::{Descended, Descent, DescentSettings, DescentStep, Ending};
 pub use state::{STATE_SCHEMA, State};
 
 use super::{
-    complex::{NoExtrusion, Places, Strips},
-    energy::energy,
-    network::{CellId, Network},
-    solve::{FactorError, Residuals, Step},
+    complex::{NoExtrusion, Strips},
+    network::{CellId, EdgeId, Network, VertexId},
+    solve::{FactorError, Residuals},
     topology,
 };
 use crate::{index::IndexVec, surface::Gap};
 use serde::{Deserialize, Serialize};
-use std::ops::ControlFlow;
+use std::{collections::BTreeSet, ops::ControlFlow};
 
 /// What can be set about a relaxation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RelaxSettings {
-    /// The mesh of the result.
+    /// The mesh of the result; films that turn far with the walls get more elements along.
     pub strips: Strips,
     /// Ends when the largest force on a freedom is below this, in units of tension × cell width.
     pub tolerance: f64,
@@ -34,6 +34,9 @@ pub struct RelaxSettings {
     /// A film flips when its edge is shorter than this part of the cell width. Above 0.1 sound short edges flip; below 0.02
     /// Newton steps on the sliver are slow.
     pub flip_below: f64,
+    /// Whether the softest mode of a converged foam is computed: it takes about as long as ten steps.
+    #[serde(default)]
+    pub softest_mode: bool,
     /// Each cell's share of the gap's volume; equal ones if none are given.
     pub shares: Option<Vec<f64>>,
 }
@@ -42,10 +45,11 @@ impl Default for RelaxSettings {
     fn default() -> Self {
         Self {
             strips: Strips { along: 2, through: 2 },
-            tolerance: 1e-11,
+            tolerance: 1e-10,
             volume_tolerance: 1e-11,
             step_limit: 400,
             flip_below: 0.05,
+            softest_mode: false,
             shares: None,
         }
     }
@@ -105,6 +109,9 @@ pub struct Relaxed {
     pub residuals: Residuals,
     /// Directions of negative curvature at the end: 0 at a minimum.
     pub unstable: usize,
+    /// The lowest eigenvalue of the Hessian on the constraints at the end (see [`crate::foam::solve::Mode`]), where it was
+    /// converged and asked for.
+    pub softest: Option<f64>,
 }
 
 /// A relaxation that could not even start.
@@ -141,9 +148,34 @@ pub fn relax(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
     let shares = shares(&network, settings.shares.as_deref())?;
-    let coarse = Strips { along: 2, through: 1 };
-    let state = State::new(network, gap, coarse, shares)?;
+    let coarse = Strips { along: LEAST_ALONG, through: 1 };
+    let mut state = State::new(network, gap, coarse, shares)?;
+    let along = elements_along(&state, gap);
+    if along > coarse.along {
+        state = State::new(state.network, gap, Strips { along, ..coarse }, state.shares)?;
+    }
     resume(state, gap, settings, progress)
+}
+
+/// The least number of elements along a film: with one, T1s happen on films that are only bent.
+const LEAST_ALONG: usize = 2;
+/// The most elements along a film of the coarse mesh: half a great circle needs no more.
+const MOST_ALONG: usize = 8;
+/// The angle that one element may turn with the walls, in radians: at 1.5 a film leaves the gap between its nodes.
+const MOST_TURN: f64 = 0.9;
+
+/// How many elements along each film follow the walls.
+fn elements_along(state: &State, gap: &Gap) -> usize {
+    let network = &state.network;
+    let turn = network.edges().map(|edge| {
+        let side = edge.half_edges()[0];
+        let mut line = state.side_line(side, state.rows() / 2);
+        line.extend(state.side_line(network.next(side), state.rows() / 2).first());
+        let length: f64 = line.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+        length * gap.middle().curvature(line[line.len() / 2]).largest()
+    });
+    let most = turn.filter(|turn| turn.is_finite()).fold(0.0, f64::max) / MOST_TURN;
+    (LEAST_ALONG..MOST_ALONG).find(|&along| real(along) >= most).unwrap_or(MOST_ALONG)
 }
 
 fn shares(network: &Network, given: Option<&[f64]>) -> Result<IndexVec<CellId, f64>, RelaxError> {
@@ -183,44 +215,52 @@ pub fn resume(
         Some(stop) => stop,
         None => run.finish(progress)?,
     };
-    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable })
+    let softest = match stop {
+        Stop::Converged { .. } if settings.softest_mode => {
+            run.descent.lowest_mode().ok().map(|mode| mode.eigenvalue)
+        }
+        _ => None,
+    };
+    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable, softest })
 }
 
 /// The residual at which the mesh is refined: T1s have ended there, and two more steps would converge the coarse mesh.
 const COARSE_TOLERANCE: f64 = 1e-4;
-/// The longest step of a node, in units of the cell width: beyond it films turn over before Newton's model holds.
-const LONGEST_STEP: f64 = 0.2;
-/// The part of an edge that one step may take away.
-const LARGEST_SHRINKING: f64 = 0.6;
-/// The wall patches are integrated anew after moves of this part of the cell width: strips are thin below it.
-const REBASE_AFTER: f64 = 0.1;
+/// The residual between two spreadings of the nodes: the next one disturbs the balance by more.
+const SPREAD_TOLERANCE: f64 = 1e-5;
 /// Spreading nodes and converging again, at most so often: each time the nodes move a tenth as far.
-const SPREADINGS: usize = 4;
+const SPREADINGS: usize = 5;
 /// Nodes that move less than this part of the cell width need not be spread again.
 const EVEN_ENOUGH: f64 = 1e-6;
+
+/// Steps shorter than this part of Newton's leave uneven nodes behind, which stop later ones.
+const DAMPED: f64 = 0.9;
+
+/// Steps after the last T1 in which uneven nodes are spread after damped steps; what has not settled by then, spreading
+/// alone will not settle.
+const SPREAD_FOR: usize = 30;
 
 struct Run<'a> {
     gap: &'a Gap,
     settings: &'a RelaxSettings,
     state: State,
-    derived: Derived,
+    descent: Descent,
     residuals: Residuals,
     unstable: usize,
-    width: f64,
+}
+
+/// Why Newton steps were halted.
+enum Halt {
+    Flip,
+    Spread,
+    Interrupt,
 }
 
 impl<'a> Run<'a> {
     fn new(state: State, gap: &'a Gap, settings: &'a RelaxSettings) -> Result<Self, RelaxError> {
-        let derived = state.derive(gap)?;
-        let width = state.cell_width();
+        let descent = state.descent(gap)?;
         let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
-        Ok(Self { gap, settings, state, derived, residuals, unstable: 0, width })
-    }
-
-    fn rederive(&mut self) -> Result<(), RelaxError> {
-        self.derived = self.state.derive(self.gap)?;
-        self.width = self.state.cell_width();
-        Ok(())
+        Ok(Self { gap, settings, state, descent, residuals, unstable: 0 })
     }
 
     /// Newton steps with T1s until the residual is below `tolerance`; `None` then, otherwise why it stopped.
@@ -229,139 +269,86 @@ impl<'a> Run<'a> {
         tolerance: f64,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Option<Stop>, RelaxError> {
-        let volume_tolerance = tolerance.max(self.settings.volume_tolerance);
-        let mut best = f64::INFINITY;
-        let mut idle = 0;
+        let mut patience = self.state.steps + SPREAD_FOR;
         loop {
-            let step = self.derived.system.step(
-                &self.derived.complex,
-                &self.state.places,
-                &self.derived.reference,
-                &self.state.pressures,
-                &self.derived.targets,
-            )?;
-            self.note(&step);
-            let size = (self.residuals.force / tolerance).max(self.residuals.volume / volume_tolerance);
-            if size <= 1.0 && step.unstable == 0 {
-                return Ok(None);
-            }
-            if self.state.steps >= self.settings.step_limit {
-                return Ok(Some(Stop::StepLimit { residual: self.residuals.force }));
-            }
-            idle = if size < 0.9 * best { 0 } else { idle + 1 };
-            best = best.min(size);
-            if idle > IDLE_STEPS {
-                let (steps, residual) = (self.state.steps, self.residuals.force);
-                return Ok(Some(Stop::Stalled { steps, residual }));
-            }
-            let fraction = self.take(&step)?;
-            self.state.steps += 1;
-            let told = Progress {
-                state: &self.state,
-                energy: energy(&self.derived.complex, &self.state.places),
-                residuals: self.residuals,
-                fraction,
-                unstable: self.unstable,
+            let settings = DescentSettings {
+                length: self.state.cell_width(),
+                tolerance,
+                volume_tolerance: tolerance.max(self.settings.volume_tolerance),
+                step_limit: self.settings.step_limit.saturating_sub(self.state.steps),
             };
-            if progress(&told).is_break() {
-                return Ok(Some(Stop::Interrupted { steps: self.state.steps }));
-            }
-            if self.flip_short()? || fraction <= 0.0 {
-                best = f64::INFINITY;
-            }
-        }
-    }
-
-    fn note(&mut self, step: &Step) {
-        let mean: f64 = self.derived.targets.iter().sum::<f64>() / real(self.derived.targets.len());
-        self.residuals =
-            Residuals { force: step.residuals.force / self.width, volume: step.residuals.volume / mean };
-        self.unstable = step.unstable;
-    }
-
-    /// Takes as much of a step as the films bear and the merit allows. Gives the fraction taken.
-    fn take(&mut self, step: &Step) -> Result<f64, RelaxError> {
-        let mut fraction = self.longest_fraction(&step.displacements);
-        let near = self.residuals.force < TRUSTED && self.residuals.volume < TRUSTED && step.unstable == 0;
-        let start = self.merit(step, &self.state.places);
-        for halving in 0..HALVINGS {
-            let complex = &self.derived.complex;
-            if let Some(places) = self.derived.system.moved(complex, &self.state.places, step, fraction)
-                && (near || halving + 1 == HALVINGS || self.merit(step, &places) <= start)
-            {
-                self.state.places = places;
-                for (id, change) in step.direction.pressures.enumerated() {
-                    self.state.pressures[id] += *change;
+            let flip_below = self.settings.flip_below;
+            let Self { state, descent, .. } = self;
+            let mut lengths = topology::edge_lengths(state);
+            let mut halt = None;
+            let mut vanishing = Vec::new();
+            let descended = descent.descend(&settings, &mut |told| {
+                state.follow(told.descent);
+                let told = Progress {
+                    state,
+                    energy: told.descent.energy(),
+                    residuals: told.residuals,
+                    fraction: told.fraction,
+                    unstable: told.unstable,
+                };
+                if progress(&told).is_break() {
+                    halt = Some(Halt::Interrupt);
+                } else {
+                    let before = std::mem::replace(&mut lengths, topology::edge_lengths(state));
+                    vanishing = topology::vanishing_edges(state, &before, flip_below);
+                    halt = if !vanishing.is_empty() {
+                        Some(Halt::Flip)
+                    } else {
+                        (told.fraction < DAMPED && state.steps < patience).then_some(Halt::Spread)
+                    };
                 }
-                if self.moved_since_reference() > REBASE_AFTER * self.width {
-                    self.rebase();
+                if halt.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            let steps = self.state.steps;
+            let Ok(descended) = descended else {
+                return Ok(Some(Stop::Stalled { steps, residual: self.residuals.force }));
+            };
+            (self.residuals, self.unstable) = (descended.residuals, descended.unstable);
+            let residual = self.residuals.force;
+            match (descended.ending, halt) {
+                (Ending::Converged, _) => return Ok(None),
+                (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
+                (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
+                (Ending::Halted, Some(Halt::Flip)) => {
+                    self.flip(&vanishing)?;
+                    patience = steps + SPREAD_FOR;
                 }
-                return Ok(fraction);
-            }
-            fraction *= 0.5;
-        }
-        Ok(0.0)
-    }
-
-    /// The augmented Lagrangian at the step's new pressures: a Newton step goes downhill on it if the penalty is stiff.
-    fn merit(&self, step: &Step, places: &Places) -> f64 {
-        let derived = &self.derived;
-        let now = super::volume::volumes(&derived.complex, places, &derived.reference);
-        let mean: f64 = derived.targets.iter().sum::<f64>() / real(derived.targets.len());
-        let stiffness = PENALTY / (self.width * mean);
-        let work: f64 = now
-            .enumerated()
-            .map(|(id, volume)| {
-                let missing = volume - derived.targets[id];
-                let pressure = self.state.pressures[id] + step.direction.pressures[id];
-                (0.5 * stiffness * missing - pressure) * missing
-            })
-            .sum();
-        energy(&derived.complex, places) + work
-    }
-
-    fn longest_fraction(&self, displacements: &Places) -> f64 {
-        let longest = displacements.iter().map(|d| d.length()).fold(0.0, f64::max);
-        let mut fraction = (LONGEST_STEP * self.width / longest).min(1.0);
-        for edge in self.state.network.edges() {
-            let (start, end) = self.state.chord(edge);
-            let side = edge.half_edges()[0];
-            let middle = |vertex| displacements[self.state.middle_node(vertex)];
-            let change = middle(self.state.network.target(side)) - middle(self.state.network.origin(side));
-            let chord = end - start;
-            let shrinking = -change.dot(chord) / chord.length_squared();
-            if shrinking * fraction > LARGEST_SHRINKING {
-                fraction = LARGEST_SHRINKING / shrinking;
+                (Ending::Halted, Some(Halt::Spread)) => {
+                    self.spread();
+                }
+                (Ending::Halted, _) => return Ok(Some(Stop::Interrupted { steps })),
             }
         }
-        fraction
     }
 
-    fn moved_since_reference(&self) -> f64 {
-        let old = self.derived.reference.places();
-        self.state.places.iter().zip(old).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
-    }
-
-    /// Integrates the wall patches anew and takes new frames.
-    fn rebase(&mut self) {
-        let derived = &mut self.derived;
-        derived.reference = super::volume::Reference::new(&derived.complex, &self.state.places);
-        derived.targets = self.state.targets(&derived.complex, &derived.reference);
-        derived.system.reframe(&derived.complex, &self.state.places);
-    }
-
-    /// Flips the edges that are short enough. Gives whether any did.
-    fn flip_short(&mut self) -> Result<bool, RelaxError> {
-        let mut any = false;
-        for edge in topology::short_edges(&self.state, self.settings.flip_below) {
-            // An earlier flip may have lengthened it.
-            let still = topology::short_edges(&self.state, self.settings.flip_below).contains(&edge);
-            any |= still && topology::flip(&mut self.state, self.gap, edge).is_ok();
+    /// Flips edges that do not touch each other, in order.
+    fn flip(&mut self, vanishing: &[EdgeId]) -> Result<(), RelaxError> {
+        let mut touched: BTreeSet<VertexId> = BTreeSet::new();
+        for &edge in vanishing {
+            let round = topology::round(&self.state.network, edge);
+            if round.iter().all(|vertex| !touched.contains(vertex)) {
+                topology::flip(&mut self.state, self.gap, edge);
+                touched.extend(round);
+            }
         }
-        if any {
-            self.rederive()?;
+        self.descent = self.state.descent(self.gap)?;
+        Ok(())
+    }
+
+    /// Spreads the nodes evenly along the films. Gives the largest move.
+    fn spread(&mut self) -> f64 {
+        let mut places = self.state.places.clone();
+        let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
+        if self.descent.complex().retract(&mut places).is_ok() {
+            self.state.places.clone_from(&places);
+            self.descent.set_places(places);
         }
-        Ok(any)
+        moved
     }
 
     /// The final mesh: refined, spread evenly, converged.
@@ -369,46 +356,31 @@ impl<'a> Run<'a> {
         &mut self,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Stop, RelaxError> {
-        if self.state.strips != self.settings.strips {
-            self.state.refine(self.settings.strips);
-            let complex = self.state.strips.complex(&self.state.network, self.gap);
-            if complex.retract(&mut self.state.places).is_err() {
-                return Ok(Stop::Stalled { steps: self.state.steps, residual: self.residuals.force });
-            }
+        let Strips { along, through } = self.settings.strips;
+        let strips = Strips { along: along.max(self.state.strips.along), through };
+        if self.state.strips != strips {
+            self.state.refine(strips);
+            self.descent = self.state.descent(self.gap)?;
         }
-        for _ in 0..SPREADINGS {
-            let moved = self.state.strips.spread_evenly(&self.state.network, &mut self.state.places);
-            let complex = self.state.strips.complex(&self.state.network, self.gap);
-            if complex.retract(&mut self.state.places).is_err() {
-                return Ok(Stop::Stalled { steps: self.state.steps, residual: self.residuals.force });
+        let mut last = false;
+        for round in 1..=SPREADINGS {
+            let moved = self.spread();
+            last |= moved <= EVEN_ENOUGH * self.state.cell_width() || round == SPREADINGS;
+            if last {
+                self.descent.integrate_walls();
             }
-            self.rederive()?;
-            if let Some(stop) = self.newton(self.settings.tolerance, progress)? {
+            let tolerance = if last { self.settings.tolerance } else { SPREAD_TOLERANCE };
+            if let Some(stop) = self.newton(tolerance, progress)? {
                 return Ok(stop);
             }
-            if moved <= EVEN_ENOUGH * self.width {
+            if last {
                 break;
             }
-        }
-        // The wall patches once more at the very places of the result, and a step or two for what that changed.
-        self.rebase();
-        if let Some(stop) = self.newton(self.settings.tolerance, progress)? {
-            return Ok(stop);
         }
         self.state.follow_films();
         Ok(Stop::Converged { steps: self.state.steps })
     }
 }
-
-/// The penalty on volume errors, in units of the tension over cell width and cell volume. A cell's own stiffness against a
-/// change of volume is about 1 in these units.
-const PENALTY: f64 = 10.0;
-/// Residuals below which full Newton steps are taken without a look at the merit, whose changes drown in rounding later.
-const TRUSTED: f64 = 1e-3;
-/// Steps without progress before a run counts as stalled.
-const IDLE_STEPS: usize = 25;
-/// Halvings of a step whose wall nodes find no wall.
-const HALVINGS: usize = 8;
 
 #[cfg(test)]
 mod tests {

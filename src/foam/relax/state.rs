@@ -2,10 +2,10 @@
 
 use crate::{
     foam::{
-        complex::{Complex, NoExtrusion, Places, RegionId, Strips},
+        complex::{NoExtrusion, Places, RegionId, Strips},
         network::{CellId, EdgeId, Network, VertexId},
-        solve::{FactorError, System},
-        volume::Reference,
+        relax::Descent,
+        solve::FactorError,
     },
     index::{Id, IndexVec},
     surface::Gap,
@@ -38,14 +38,6 @@ pub struct State {
     pub flips_of_edge: IndexVec<EdgeId, u32>,
 }
 
-/// What follows from a state and is rebuilt whenever its topology or mesh changes.
-pub(crate) struct Derived {
-    pub(crate) complex: Complex,
-    pub(crate) reference: Reference,
-    pub(crate) system: System,
-    pub(crate) targets: IndexVec<RegionId, f64>,
-}
-
 impl State {
     /// A first state: films extruded through the network's edges.
     ///
@@ -64,19 +56,21 @@ impl State {
         Ok(Self { schema, network, strips, places, pressures, shares, steps: 0, flips: 0, flips_of_edge })
     }
 
-    /// Complex, reference, system and target volumes at the present places.
-    pub(crate) fn derive(&self, gap: &Gap) -> Result<Derived, FactorError> {
+    /// The descent from the present places.
+    pub(crate) fn descent(&self, gap: &Gap) -> Result<Descent, FactorError> {
         let complex = self.strips.complex(&self.network, gap);
-        let reference = Reference::new(&complex, &self.places);
-        let system = System::new(&complex, &self.places)?;
-        let targets = self.targets(&complex, &reference);
-        Ok(Derived { complex, reference, system, targets })
+        let mut places = self.places.clone();
+        // A node that finds no wall stays where it is; the descent's residuals tell.
+        let _ = complex.retract(&mut places);
+        let shares = self.shares.iter().copied().collect();
+        Descent::new(complex, shares, places, self.pressures.clone())
     }
 
-    /// The target volumes: the shares of the sum of all volumes, which the walls fix.
-    pub(crate) fn targets(&self, complex: &Complex, reference: &Reference) -> IndexVec<RegionId, f64> {
-        let total: f64 = crate::foam::volume::volumes(complex, &self.places, reference).iter().sum();
-        self.shares.iter().map(|share| share * total).collect()
+    /// Takes over one step of a descent.
+    pub(crate) fn follow(&mut self, descent: &Descent) {
+        self.places.clone_from(descent.places());
+        self.pressures.clone_from(descent.pressures());
+        self.steps += 1;
     }
 
     /// The chord of an edge between the middles of its two borders, in the frame of its first half-edge's origin: start and

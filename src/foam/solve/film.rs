@@ -5,12 +5,20 @@ use super::{
     motion::{Frames, Motions, tangent_projection, wall_curvature},
 };
 use crate::foam::{
-    complex::{Complex, Film, Motion, NodeId, Places, RegionId},
+    complex::{Complex, Film, Motion, Node, NodeId, Places, RegionId},
     energy::{Blocks, FilmLoads, add_element},
     volume::{Reference, StripLoads, WallEdge},
 };
 use crate::index::IndexVec;
-use faer::{Accum, Mat, Par, Side, linalg::matmul::matmul, linalg::solvers::Llt, prelude::Solve};
+use faer::{
+    Accum, Mat, MatMut, MatRef, Par, Spec,
+    dyn_stack::{MemBuffer, MemStack},
+    linalg::{
+        cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch},
+        matmul::matmul,
+        triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place},
+    },
+};
 use glam::{DMat3, DVec3};
 
 /// The state that a film is assembled at.
@@ -21,23 +29,26 @@ pub(super) struct At<'a> {
     pub(super) pressures: &'a IndexVec<RegionId, f64>,
     pub(super) motions: &'a Motions,
     pub(super) frames: &'a Frames,
-    /// Added to the diagonal of the Hessian.
-    pub(super) shift: f64,
+}
+
+/// A film's share before condensation, over its freedoms and then the motions of its inner nodes along their normals.
+pub(super) struct FilmHessian {
+    hessian: Mat<f64>,
+    /// The derivatives of minus the volumes of back and front.
+    volumes: [Mat<f64>; 2],
+    /// The gradient of the Lagrangian.
+    pub(super) gradient: Vec<f64>,
+    /// The gradient by the places of the bounding nodes, with what slaved nodes pass on.
+    pub(super) forces: Vec<(NodeId, DVec3)>,
 }
 
 /// A film's condensed share.
 pub(super) struct FilmSystem {
     /// Over the film's unknowns (freedoms, then the two pressures): the condensed matrix.
     pub(super) matrix: Mat<f64>,
-    /// The gradient of the Lagrangian by the film's freedoms.
-    pub(super) gradient: Vec<f64>,
-    /// The same by the motions of its inner nodes along their normals.
-    pub(super) inner_gradient: Vec<f64>,
-    /// The gradient by the places of the bounding nodes, with what slaved nodes pass on.
-    pub(super) forces: Vec<(NodeId, DVec3)>,
     /// Whether the inner block had to be stiffened to be positive definite.
     pub(super) stiffened: bool,
-    factor: Option<Llt<f64>>,
+    factor: Option<Factor>,
     /// Inner rows of the matrix before condensation.
     coupling: Mat<f64>,
     /// The inverse inner block times `coupling`.
@@ -120,132 +131,169 @@ fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout) -> NodeShares {
 fn displacements(at: &At<'_>, layout: &FilmLayout) -> (Mat<f64>, Vec<DMat3>) {
     let outer = layout.freedoms.len();
     let mut map = Mat::<f64>::zeros(3 * layout.nodes.len(), outer + layout.inner.len());
-    let mut add = |row: usize, column: usize, d: DVec3| {
+    let add = |map: &mut Mat<f64>, row: usize, column: usize, d: DVec3| {
         for axis in 0..3 {
             map[(3 * row + axis, column)] += d[axis];
         }
     };
     // A film's freedoms are sorted, and those of a node are consecutive.
     let column_of = |freedom: usize| layout.freedoms.partition_point(|&f| f < freedom);
-    let mut projections = Vec::with_capacity(layout.inner.len());
     for (row, image) in layout.nodes.iter().enumerate() {
-        let node = &at.complex.nodes[image.node];
-        let Motion::Inner(masters) = &node.motion else {
+        if !matches!(at.complex.nodes[image.node].motion, Motion::Inner(_)) {
             for &(freedom, d) in &at.motions.columns[image.node] {
-                add(row, column_of(freedom), d);
-            }
-            continue;
-        };
-        let projection = tangent_projection(at.complex, node, at.places[image.node]);
-        for &(master, weight) in masters {
-            for &(freedom, d) in &at.motions.columns[master] {
-                add(row, column_of(freedom), weight * (projection * d));
+                add(&mut map, row, column_of(freedom), d);
             }
         }
-        add(row, outer + projections.len(), projection * at.frames.axis(image.node));
+    }
+    let mut projections = Vec::with_capacity(layout.inner.len());
+    for (own, (&row, inner_masters)) in layout.inner.iter().zip(&layout.inner_masters).enumerate() {
+        let image = layout.nodes[row];
+        let node = &at.complex.nodes[image.node];
+        let projection = tangent_projection(at.complex, node, at.places[image.node]);
+        for &(master, weight) in bounding_masters(at.complex, node) {
+            for &(freedom, d) in &at.motions.columns[master] {
+                add(&mut map, row, column_of(freedom), weight * (projection * d));
+            }
+        }
+        for &(master, weight) in inner_masters {
+            let from = 3 * layout.inner[master];
+            for column in (0..outer).chain(outer..outer + own) {
+                let d = DVec3::new(map[(from, column)], map[(from + 1, column)], map[(from + 2, column)]);
+                add(&mut map, row, column, weight * (projection * d));
+            }
+        }
+        add(&mut map, row, outer + own, projection * at.frames.axis(image.node));
         projections.push(projection);
     }
     (map, projections)
 }
 
-/// Assembles and condenses a film.
-pub(super) fn assemble(at: &At<'_>, film: &Film, layout: &FilmLayout) -> FilmSystem {
+/// The masters of an inner node that bound films.
+fn bounding_masters<'a>(complex: &'a Complex, node: &'a Node) -> impl Iterator<Item = &'a (NodeId, f64)> {
+    let masters: &[_] = match &node.motion {
+        Motion::Inner(masters) => masters,
+        _ => &[],
+    };
+    masters.iter().filter(|&&(master, _)| !matches!(complex.nodes[master].motion, Motion::Inner(_)))
+}
+
+/// Assembles a film.
+pub(super) fn assemble(at: &At<'_>, film: &Film, layout: &FilmLayout) -> FilmHessian {
     let mut shares = node_shares(at, film, layout);
     let (map, projections) = displacements(at, layout);
-    let mut forces = Vec::with_capacity(layout.nodes.len());
-    let mut inner_at = 0;
-    for (row, image) in layout.nodes.iter().enumerate() {
-        let node = &at.complex.nodes[image.node];
-        let force = shares.lagrangian[row];
-        let Motion::Inner(masters) = &node.motion else {
-            forces.push((image.node, force));
-            continue;
-        };
-        if !node.walls.is_empty() {
-            let curvature = wall_curvature(at.complex, node, at.places[image.node], force);
-            shares.hessian.add(row, row, curvature);
-        }
-        let passed = projections[inner_at] * force;
-        forces.extend(masters.iter().map(|&(master, weight)| (master, weight * passed)));
-        inner_at += 1;
-    }
+    let forces = forces(at, layout, &projections, &mut shares);
     let flat = |nodes: &[DVec3]| Mat::from_fn(3 * nodes.len(), 1, |i, _| nodes[i / 3][i % 3]);
     let pull = |nodes: &[DVec3]| times(map.transpose(), flat(nodes).as_ref());
     let (gradient, back, front) = (pull(&shares.lagrangian), pull(&shares.back), pull(&shares.front));
     let moved = times(shares.hessian.as_mat(), map.as_ref());
-    let mut hessian = times(map.transpose(), moved.as_ref());
-    for i in 0..hessian.nrows() {
-        hessian[(i, i)] += if i < layout.freedoms.len() { 0.0 } else { at.shift };
-    }
-    condense(layout, &hessian, &[back, front], &gradient, forces)
+    let hessian = times(map.transpose(), moved.as_ref());
+    let gradient = (0..gradient.nrows()).map(|i| gradient[(i, 0)]).collect();
+    FilmHessian { hessian, volumes: [back, front], gradient, forces }
 }
 
-fn times(a: faer::MatRef<'_, f64>, b: faer::MatRef<'_, f64>) -> Mat<f64> {
+/// The forces on bounding nodes, with what the inner nodes pass on to them; the walls' curvature under the inner nodes goes
+/// into the Hessian on the way.
+fn forces(
+    at: &At<'_>,
+    layout: &FilmLayout,
+    projections: &[DMat3],
+    shares: &mut NodeShares,
+) -> Vec<(NodeId, DVec3)> {
+    let is_inner = |node: NodeId| matches!(at.complex.nodes[node].motion, Motion::Inner(_));
+    let mut forces: Vec<(NodeId, DVec3)> = layout
+        .nodes
+        .iter()
+        .zip(&shares.lagrangian)
+        .filter(|(image, _)| !is_inner(image.node))
+        .map(|(image, &force)| (image.node, force))
+        .collect();
+    let mut on_inner: Vec<DVec3> = layout.inner.iter().map(|&row| shares.lagrangian[row]).collect();
+    // Slaves before their masters: what they pass on presses the masters against their walls, too.
+    for (own, &row) in layout.inner.iter().enumerate().rev() {
+        let image = layout.nodes[row];
+        let node = &at.complex.nodes[image.node];
+        let force = on_inner[own];
+        if !node.walls.is_empty() {
+            let curvature = wall_curvature(at.complex, node, at.places[image.node], force);
+            shares.hessian.add(row, row, curvature);
+        }
+        let passed = projections[own] * force;
+        forces.extend(bounding_masters(at.complex, node).map(|&(master, weight)| (master, weight * passed)));
+        for &(master, weight) in &layout.inner_masters[own] {
+            on_inner[master] += weight * passed;
+        }
+    }
+    forces
+}
+
+fn times(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = Mat::zeros(a.nrows(), b.ncols());
     matmul(product.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
     product
 }
 
-fn condense(
-    layout: &FilmLayout,
-    hessian: &Mat<f64>,
-    volumes: &[Mat<f64>; 2],
-    gradient: &Mat<f64>,
-    forces: Vec<(NodeId, DVec3)>,
-) -> FilmSystem {
+/// Condenses a film, with `shift` added to the diagonal of its inner block.
+pub(super) fn condense(layout: &FilmLayout, film: &FilmHessian, shift: f64) -> FilmSystem {
     let (outer, inner) = (layout.freedoms.len(), layout.inner.len());
+    let hessian = film.hessian.as_ref();
     let mut matrix = Mat::<f64>::zeros(outer + 2, outer + 2);
-    for j in 0..outer {
-        for i in 0..outer {
-            matrix[(i, j)] = hessian[(i, j)];
-        }
-        for (side, volume) in volumes.iter().enumerate() {
+    matrix.as_mut().submatrix_mut(0, 0, outer, outer).copy_from(hessian.submatrix(0, 0, outer, outer));
+    let mut coupling = Mat::<f64>::zeros(inner, outer + 2);
+    coupling.as_mut().submatrix_mut(0, 0, inner, outer).copy_from(hessian.submatrix(outer, 0, inner, outer));
+    for (side, volume) in film.volumes.iter().enumerate() {
+        for j in 0..outer {
             matrix[(outer + side, j)] = volume[(j, 0)];
             matrix[(j, outer + side)] = volume[(j, 0)];
         }
-    }
-    let mut coupling = Mat::<f64>::zeros(inner, outer + 2);
-    for i in 0..inner {
-        for j in 0..outer {
-            coupling[(i, j)] = hessian[(outer + i, j)];
-        }
-        for (side, volume) in volumes.iter().enumerate() {
+        for i in 0..inner {
             coupling[(i, outer + side)] = volume[(outer + i, 0)];
         }
     }
-    let (factor, stiffened) = positive_factor(hessian, outer, inner);
+    let (factor, stiffened) = positive_factor(hessian.submatrix(outer, outer, inner, inner), shift);
     let mut answer = coupling.clone();
     if let Some(factor) = &factor {
         factor.solve_in_place(answer.as_mut());
         matmul(matrix.as_mut(), Accum::Add, coupling.transpose(), answer.as_ref(), -1.0, Par::Seq);
     }
-    FilmSystem {
-        matrix,
-        gradient: (0..outer).map(|i| gradient[(i, 0)]).collect(),
-        inner_gradient: (0..inner).map(|i| gradient[(outer + i, 0)]).collect(),
-        forces,
-        stiffened,
-        factor,
-        coupling,
-        answer,
+    FilmSystem { matrix, stiffened, factor, coupling, answer }
+}
+
+/// A dense Cholesky factor, its upper triangle undefined. Films are many and small: threads work on films, never within one.
+struct Factor(Mat<f64>);
+
+impl Factor {
+    fn new(mut matrix: Mat<f64>) -> Option<Self> {
+        let size = matrix.nrows();
+        let mut memory =
+            MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Spec::default())).ok()?;
+        let stack = MemStack::new(&mut memory);
+        cholesky_in_place(matrix.as_mut(), Default::default(), Par::Seq, stack, Spec::default()).ok()?;
+        Some(Self(matrix))
+    }
+
+    fn solve_in_place(&self, mut rhs: MatMut<'_, f64>) {
+        solve_lower_triangular_in_place(self.0.as_ref(), rhs.as_mut(), Par::Seq);
+        solve_upper_triangular_in_place(self.0.transpose(), rhs, Par::Seq);
     }
 }
 
 /// Tenfold stiffenings tried before a film's inner block counts as hopeless.
 const STIFFENINGS: i32 = 12;
 
-/// The Cholesky factor of the inner block, stiffened along its diagonal until it is positive definite.
-fn positive_factor(hessian: &Mat<f64>, outer: usize, inner: usize) -> (Option<Llt<f64>>, bool) {
+/// The Cholesky factor of the inner block with `shift` on its diagonal, stiffened further until it is positive definite.
+fn positive_factor(block: MatRef<'_, f64>, shift: f64) -> (Option<Factor>, bool) {
+    let inner = block.nrows();
     if inner == 0 {
         return (None, false);
     }
-    let scale = (0..inner).map(|i| hessian[(outer + i, outer + i)].abs()).fold(0.0, f64::max);
+    let scale = (0..inner).map(|i| block[(i, i)].abs()).fold(0.0, f64::max);
     for attempt in -1..STIFFENINGS {
         let extra = if attempt < 0 { 0.0 } else { scale * 1e-4 * 10_f64.powi(attempt) };
-        let block = Mat::from_fn(inner, inner, |i, j| {
-            hessian[(outer + i, outer + j)] + if i == j { extra } else { 0.0 }
-        });
-        if let Ok(factor) = block.llt(Side::Lower) {
+        let mut stiff = block.to_owned();
+        for i in 0..inner {
+            stiff[(i, i)] += shift + extra;
+        }
+        if let Some(factor) = Factor::new(stiff) {
             return (Some(factor), attempt >= 0);
         }
     }

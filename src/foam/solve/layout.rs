@@ -16,8 +16,10 @@ pub(super) struct FilmLayout {
     pub(super) nodes: Vec<NodeImage>,
     /// For each element, the rows of its nodes in `nodes`.
     pub(super) rows: Vec<Vec<usize>>,
-    /// The rows of the inner nodes.
+    /// The rows of the inner nodes, masters before their slaves.
     pub(super) inner: Vec<usize>,
+    /// For each inner node its masters that are inner nodes, too: their places in `inner` and their weights.
+    pub(super) inner_masters: Vec<Vec<(usize, f64)>>,
     /// The freedoms of the bounding nodes that move this film, in order.
     pub(super) freedoms: Vec<usize>,
     /// The unknowns: those of `freedoms`, then the pressures of back and front; `None` where held.
@@ -39,6 +41,10 @@ pub(super) struct Layout {
     /// How many of them are pressures.
     pub(super) pressures: usize,
     pub(super) films: Vec<FilmLayout>,
+    /// The cells of each part whose volumes' sum is fixed by walls.
+    pub(super) closed_parts: Vec<Vec<RegionId>>,
+    /// All nodes, masters before their slaves.
+    pub(super) order_of_motion: Vec<NodeId>,
     pub(super) pattern: SymbolicSparseColMat<usize>,
     pub(super) order: Argsort<usize>,
 }
@@ -69,25 +75,41 @@ impl Layout {
         };
         let of_freedom: Vec<Option<usize>> =
             (0..count).map(|freedom| next(!held.contains(&freedom))).collect();
-        let gauged = gauged_cells(complex);
+        let closed_parts = closed_parts(complex);
+        // The volume of one cell of such a part follows from the others.
+        let gauged: Vec<RegionId> = closed_parts.iter().filter_map(|part| part.first().copied()).collect();
         let of_pressure: IndexVec<RegionId, Option<usize>> = complex
             .regions
             .enumerated()
             .map(|(id, region)| next(region.kind == RegionKind::Cell && !gauged.contains(&id)))
             .collect();
         let pressures = of_pressure.iter().flatten().count();
+        let depths = depths(complex);
+        let mut order_of_motion: Vec<NodeId> = complex.nodes.ids().collect();
+        order_of_motion.sort_by_key(|&node| depths[node]);
         let films: Vec<FilmLayout> = complex
             .films
             .iter()
-            .map(|film| film_layout(complex, film, &freedoms, &of_freedom, &of_pressure))
+            .map(|film| film_layout(complex, film, &depths, &freedoms, &of_freedom, &of_pressure))
             .collect();
         let (pattern, order) = pattern(&films, &freedoms, &of_freedom, unknowns);
-        Self { freedoms, of_freedom, of_pressure, unknowns, pressures, films, pattern, order }
+        Self {
+            freedoms,
+            of_freedom,
+            of_pressure,
+            unknowns,
+            pressures,
+            films,
+            closed_parts,
+            order_of_motion,
+            pattern,
+            order,
+        }
     }
 }
 
-/// One cell of every part of the foam that does not touch the open air: the walls fix the sum of such a part's volumes.
-fn gauged_cells(complex: &Complex) -> Vec<RegionId> {
+/// The cells of every part of the foam that does not touch the open air.
+fn closed_parts(complex: &Complex) -> Vec<Vec<RegionId>> {
     let mut part: Vec<usize> = (0..complex.regions.len()).collect();
     fn root(part: &mut [usize], mut at: usize) -> usize {
         while part[at] != at {
@@ -100,13 +122,29 @@ fn gauged_cells(complex: &Complex) -> Vec<RegionId> {
         let (a, b) = (root(&mut part, film.back.region.index()), root(&mut part, film.front.region.index()));
         part[a.max(b)] = a.min(b);
     }
-    let mut open = vec![false; part.len()];
-    for (id, region) in complex.regions.enumerated() {
-        let at = root(&mut part, id.index());
-        open[at] |= region.kind == RegionKind::Open;
+    let mut parts: BTreeMap<usize, Vec<RegionId>> = BTreeMap::new();
+    for id in complex.regions.ids() {
+        parts.entry(root(&mut part, id.index())).or_default().push(id);
     }
-    (0..part.len()).filter(|&at| part[at] == at && !open[at]).map(RegionId::from_index).collect()
+    let closed = |part: &Vec<RegionId>| part.iter().all(|&id| complex.regions[id].kind == RegionKind::Cell);
+    parts.into_values().filter(closed).collect()
 }
+
+/// How many generations of masters each node has. Masters of masters are few, and chains of them end at free nodes.
+fn depths(complex: &Complex) -> IndexVec<NodeId, usize> {
+    let mut depths = IndexVec::from_elem(0, complex.nodes.len());
+    for _ in 0..MOST_GENERATIONS {
+        for (id, node) in complex.nodes.enumerated() {
+            if let Motion::Border(masters) | Motion::Inner(masters) = &node.motion {
+                depths[id] = masters.iter().map(|&(master, _)| depths[master] + 1).max().unwrap_or(1);
+            }
+        }
+    }
+    depths
+}
+
+/// Free nodes, nodes of borders, inner nodes on walls, inner nodes that follow those.
+const MOST_GENERATIONS: usize = 4;
 
 /// The bounding nodes that a node's motion depends on, itself included if it is one.
 fn bounding(complex: &Complex, node: NodeId, found: &mut Vec<NodeId>) {
@@ -127,6 +165,7 @@ fn bounding(complex: &Complex, node: NodeId, found: &mut Vec<NodeId>) {
 fn film_layout(
     complex: &Complex,
     film: &Film,
+    depths: &IndexVec<NodeId, usize>,
     freedoms: &IndexVec<NodeId, (usize, usize)>,
     of_freedom: &[Option<usize>],
     of_pressure: &IndexVec<RegionId, Option<usize>>,
@@ -157,13 +196,26 @@ fn film_layout(
             inner.push(row);
         }
     }
+    inner.sort_by_key(|&row: &usize| depths[nodes[row].node]);
+    let place_of: BTreeMap<NodeId, usize> =
+        inner.iter().enumerate().rev().map(|(at, &row)| (nodes[row].node, at)).collect();
+    let inner_masters = inner
+        .iter()
+        .map(|&row| match &complex.nodes[nodes[row].node].motion {
+            Motion::Inner(masters) => masters
+                .iter()
+                .filter_map(|(master, weight)| Some((*place_of.get(master)?, *weight)))
+                .collect(),
+            _ => Vec::new(),
+        })
+        .collect();
     found.sort_unstable();
     found.dedup();
     let own: Vec<usize> =
         found.iter().flat_map(|&node| freedoms[node].0..freedoms[node].0 + freedoms[node].1).collect();
     let mut unknowns: Vec<Option<usize>> = own.iter().map(|&freedom| of_freedom[freedom]).collect();
     unknowns.extend([of_pressure[film.back.region], of_pressure[film.front.region]]);
-    FilmLayout { nodes, rows, inner, freedoms: own, unknowns }
+    FilmLayout { nodes, rows, inner, inner_masters, freedoms: own, unknowns }
 }
 
 /// The lower triangle's entries in the order in which values are given: each film's, each bounding node's own block, the

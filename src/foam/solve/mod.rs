@@ -11,19 +11,21 @@
 
 mod film;
 mod layout;
+mod mode;
 mod motion;
 mod rigid;
 mod sparse;
 pub(crate) mod symmetric;
 
+pub use mode::Mode;
 pub use sparse::FactorError;
 
 use super::{
-    complex::{Complex, Motion, Places, RegionId},
+    complex::{Complex, Motion, Node, NodeId, Places, RegionId},
     volume::{Reference, volumes},
 };
 use crate::index::IndexVec;
-use film::{At, FilmSystem};
+use film::{At, FilmHessian, FilmSystem};
 use glam::DVec3;
 use layout::{Layout, lower_pairs};
 use motion::{Frames, Motions};
@@ -63,6 +65,9 @@ pub struct Direction {
 pub struct Step {
     /// Where to go.
     pub direction: Direction,
+    /// The change of pressures that balances the forces best where the films are now, whatever the volumes: far from the
+    /// wanted volumes those of `direction` are what it takes to get there, and bend the Hessian of the next step.
+    pub balance: IndexVec<RegionId, f64>,
     /// Displacements of all nodes for the full step, before the return to the walls.
     pub displacements: Places,
     /// The part of them that belongs to each node's own freedoms.
@@ -77,6 +82,9 @@ pub struct Step {
 
 /// The stiffening starts at this part of the tension and grows tenfold: film Hessians have diagonals of the order of γ.
 const FIRST_SHIFT: f64 = 1e-3;
+/// The part of a cell's compliance that is taken off its pressure's diagonal. With 1e-5 refinement is slow; below 1e-12 the
+/// factors are too large for it to help.
+const SOFTENING: f64 = 1e-9;
 /// Stiffenings before giving up: at 10⁵ γ a step is no longer a step.
 const SHIFTS: i32 = 9;
 
@@ -96,13 +104,19 @@ impl System {
         self.frames = Frames::new(complex, places);
     }
 
+    /// The cells of each part of the foam that walls close on all sides: they fix the sum of the part's volumes.
+    #[must_use]
+    pub fn closed_parts(&self) -> &[Vec<RegionId>] {
+        &self.layout.closed_parts
+    }
+
     /// The number of unknowns of the condensed system.
     #[must_use]
     pub fn unknowns(&self) -> usize {
         self.layout.unknowns
     }
 
-    fn assemble(&self, at: &At<'_>) -> Vec<FilmSystem> {
+    fn assemble(&self, at: &At<'_>) -> Vec<FilmHessian> {
         at.complex
             .films
             .as_slice()
@@ -112,35 +126,67 @@ impl System {
             .collect()
     }
 
-    /// The values of the matrix in the order of the layout's pattern.
-    fn entries(&self, at: &At<'_>, films: &[FilmSystem]) -> Vec<f64> {
-        let layout = &self.layout;
-        let mut entries = Vec::new();
+    fn condense(&self, films: &[FilmHessian], shift: f64) -> Vec<FilmSystem> {
+        films
+            .par_iter()
+            .zip(&self.layout.films)
+            .map(|(film, layout)| film::condense(layout, film, shift))
+            .collect()
+    }
+
+    /// The share of the walls' curvature under the bounding nodes: the own block of each, in the layout's order.
+    fn wall_entries(&self, at: &At<'_>, films: &[FilmHessian]) -> Vec<f64> {
         let mut forces: Places = Places::from_elem(DVec3::ZERO, at.complex.nodes.len());
-        for (film, places) in films.iter().zip(&layout.films) {
-            entries.extend(lower_pairs(&places.unknowns).map(|(i, j, _, _)| film.matrix[(i, j)]));
-            for &(node, force) in &film.forces {
-                forces[node] += force;
-            }
+        for &(node, force) in films.iter().flat_map(|film| &film.forces) {
+            forces[node] += force;
         }
         pass_to_masters(at.complex, &mut forces);
+        let mut entries = Vec::new();
         for (id, node) in at.complex.nodes.enumerated() {
-            let (first, own) = layout.freedoms[id];
+            let (first, own) = self.layout.freedoms[id];
             if own == 0 {
                 continue;
             }
             let curvature = motion::wall_curvature(at.complex, node, at.places[id], forces[id]);
             let columns = &at.motions.columns[id];
-            entries.extend(lower_pairs(&layout.of_freedom[first..first + own]).map(|(i, j, _, _)| {
+            entries.extend(lower_pairs(&self.layout.of_freedom[first..first + own]).map(|(i, j, _, _)| {
                 if node.walls.is_empty() { 0.0 } else { columns[i].1.dot(curvature * columns[j].1) }
             }));
         }
-        let freedoms = layout.unknowns - layout.pressures;
-        entries.extend((0..layout.unknowns).map(|at_| if at_ < freedoms { at.shift } else { 0.0 }));
         entries
     }
 
-    /// One Newton step towards least energy at the volumes `targets`.
+    /// The values of the matrix in the order of the layout's pattern.
+    fn entries(&self, films: &[FilmSystem], walls: &[f64], shift: f64) -> Vec<f64> {
+        let layout = &self.layout;
+        let mut entries = Vec::with_capacity(walls.len() + layout.unknowns + 200 * films.len());
+        for (film, places) in films.iter().zip(&layout.films) {
+            entries.extend(lower_pairs(&places.unknowns).map(|(i, j, _, _)| film.matrix[(i, j)]));
+        }
+        entries.extend_from_slice(walls);
+        let freedoms = layout.unknowns - layout.pressures;
+        entries.extend((0..layout.unknowns).map(|unknown| if unknown < freedoms { shift } else { 0.0 }));
+        entries
+    }
+
+    /// What is taken off each unknown's diagonal for the factorization: for a pressure a small part of what its cell's
+    /// compliance is about, the squares of its volume's derivatives over a film's stiffness γ.
+    fn softening(&self, films: &[FilmSystem]) -> Vec<f64> {
+        let layout = &self.layout;
+        let mut softening = vec![0.0; layout.unknowns];
+        for (film, places) in films.iter().zip(&layout.films) {
+            let outer = places.freedoms.len();
+            for row in [outer, outer + 1] {
+                if let Some(unknown) = places.unknowns[row] {
+                    softening[unknown] +=
+                        SOFTENING * (0..outer).map(|j| film.matrix[(row, j)].powi(2)).sum::<f64>();
+                }
+            }
+        }
+        softening
+    }
+
+    /// One Newton step towards least energy at the volumes `targets`, with at least `damping` added to the Hessian's diagonal.
     ///
     /// # Errors
     /// [`FactorError`] if no stiffening makes the system solvable.
@@ -151,42 +197,79 @@ impl System {
         reference: &Reference,
         pressures: &IndexVec<RegionId, f64>,
         targets: &IndexVec<RegionId, f64>,
+        damping: f64,
     ) -> Result<Step, FactorError> {
         let now = volumes(complex, places, reference);
+        let excess = now.iter().zip(targets).map(|(now, target)| now - target).collect();
+        self.step_by(complex, places, reference, pressures, &excess, damping)
+    }
+
+    /// As [`System::step`], with the volumes that the cells have too much.
+    ///
+    /// # Errors
+    /// As [`System::step`].
+    pub fn step_by(
+        &self,
+        complex: &Complex,
+        places: &Places,
+        reference: &Reference,
+        pressures: &IndexVec<RegionId, f64>,
+        excess: &IndexVec<RegionId, f64>,
+        damping: f64,
+    ) -> Result<Step, FactorError> {
         let motions = Motions::new(complex, places, &self.layout, &self.frames);
-        let mut shift = 0.0;
+        let at = At { complex, places, reference, pressures, motions: &motions, frames: &self.frames };
+        let assembled = self.assemble(&at);
+        let walls = self.wall_entries(&at, &assembled);
+        let (rhs, residuals) = self.loads(complex, &assembled, excess);
+        let mut forces = rhs.clone();
+        forces.pressures.iter_mut().for_each(|missing| *missing = 0.0);
+        let mut solution = None;
+        let (unstable, shift) = self.stiffened(&assembled, &walls, damping, |factored, films| {
+            solution = self
+                .solve(factored, films, &rhs)
+                .and_then(|direction| Ok((direction, self.solve(factored, films, &forces)?.pressures)))
+                .ok()
+                .filter(|(direction, _)| direction.freedoms.iter().all(|x| x.is_finite()));
+            solution.is_some()
+        })?;
+        let Some((direction, balance)) = solution else {
+            return Err(FactorError::Singular { unknowns: self.layout.unknowns });
+        };
+        let own_displacements = self.own_displacements(complex, &motions, &direction);
+        let displacements = self.displacements(complex, places, &own_displacements);
+        Ok(Step { direction, balance, displacements, own_displacements, residuals, unstable, shift })
+    }
+
+    /// Stiffens the Hessian from `damping` on until it is positive on the constraints and `accept` takes its factors. Gives
+    /// the directions of negative curvature of the Hessian as it is, and the stiffening.
+    fn stiffened(
+        &self,
+        assembled: &[FilmHessian],
+        walls: &[f64],
+        damping: f64,
+        mut accept: impl FnMut(&Factored<'_>, &[FilmSystem]) -> bool,
+    ) -> Result<(usize, f64), FactorError> {
+        let mut shift = damping;
         let mut unstable = None;
         let mut stiff = false;
         for attempt in 0..SHIFTS {
-            let at =
-                At { complex, places, reference, pressures, motions: &motions, frames: &self.frames, shift };
-            let films = self.assemble(&at);
-            let factored = Factored::new(&self.layout, &self.symbolic, &self.entries(&at, &films));
+            let films = self.condense(assembled, shift);
+            let softening = self.softening(&films);
+            let entries = self.entries(&films, walls, shift);
+            let factored = Factored::new(&self.layout, &self.symbolic, entries, &softening);
             let extra = factored.as_ref().map_or(1, |f| f.negative.saturating_sub(self.layout.pressures));
             let stiffened = films.iter().filter(|film| film.stiffened).count();
             unstable.get_or_insert(extra + stiffened);
             // A Hessian that is just positive gives steps as wild as one that is not: one stiffening more.
-            let sound = extra == 0 && (shift <= 0.0 || std::mem::replace(&mut stiff, true));
+            let sound = extra == 0 && (attempt == 0 || std::mem::replace(&mut stiff, true));
             if let Ok(factored) = factored
                 && sound
+                && accept(&factored, &films)
             {
-                let (rhs, residuals) = self.loads(complex, &films, &now, targets);
-                let direction = self.solve(&factored, &films, &rhs)?;
-                if direction.freedoms.iter().all(|x| x.is_finite()) {
-                    let displacements = self.displacements(complex, &motions, &direction);
-                    let own_displacements = self.own_displacements(complex, &motions, &direction);
-                    let unstable = unstable.unwrap_or(0);
-                    return Ok(Step {
-                        direction,
-                        displacements,
-                        own_displacements,
-                        residuals,
-                        unstable,
-                        shift,
-                    });
-                }
+                return Ok((unstable.unwrap_or(0), shift));
             }
-            shift = FIRST_SHIFT * 10_f64.powi(attempt);
+            shift = (10.0 * shift).max(FIRST_SHIFT);
         }
         Err(FactorError::Singular { unknowns: self.layout.unknowns })
     }
@@ -195,9 +278,8 @@ impl System {
     fn loads(
         &self,
         complex: &Complex,
-        films: &[FilmSystem],
-        now: &IndexVec<RegionId, f64>,
-        targets: &IndexVec<RegionId, f64>,
+        films: &[FilmHessian],
+        excess: &IndexVec<RegionId, f64>,
     ) -> (Direction, Residuals) {
         let mut freedoms = vec![0.0; self.layout.of_freedom.len()];
         for (film, layout) in films.iter().zip(&self.layout.films) {
@@ -205,8 +287,11 @@ impl System {
                 freedoms[freedom] -= value;
             }
         }
-        let inner: Vec<Vec<f64>> =
-            films.iter().map(|film| film.inner_gradient.iter().map(|value| -value).collect()).collect();
+        let inner: Vec<Vec<f64>> = films
+            .iter()
+            .zip(&self.layout.films)
+            .map(|(film, layout)| film.gradient[layout.freedoms.len()..].iter().map(|value| -value).collect())
+            .collect();
         // Held freedoms carry no load: by symmetry it vanishes at equilibrium up to the error of the mesh.
         for (value, unknown) in freedoms.iter_mut().zip(&self.layout.of_freedom) {
             *value = unknown.map_or(0.0, |_| *value);
@@ -214,7 +299,7 @@ impl System {
         let pressures: IndexVec<RegionId, f64> = complex
             .regions
             .ids()
-            .map(|id| if self.is_cell(complex, id) { now[id] - targets[id] } else { 0.0 })
+            .map(|id| if self.is_cell(complex, id) { excess[id] } else { 0.0 })
             .collect();
         let most = |values: &[f64]| {
             values.iter().fold(0.0, |most: f64, x| if x.is_nan() { f64::NAN } else { most.max(x.abs()) })
@@ -259,7 +344,7 @@ impl System {
                 }
             }
         }
-        let (solution, _) = factored.solve(&loads)?;
+        let solution = factored.solve(&loads)?;
         let of = |unknown: &Option<usize>| unknown.map_or(0.0, |at| solution[at]);
         inner.par_iter_mut().zip(films).zip(&layout.films).for_each(|((free, film), places)| {
             let unknowns: Vec<f64> = places.unknowns.iter().map(of).collect();
@@ -277,23 +362,14 @@ impl System {
     #[must_use]
     pub fn moved(&self, complex: &Complex, places: &Places, step: &Step, fraction: f64) -> Option<Places> {
         let mut moved = places.clone();
-        let own = &step.own_displacements;
-        for stage in [Stage::Free, Stage::Border, Stage::Inner] {
-            for (id, node) in complex.nodes.enumerated() {
-                let masters: &[_] = match (&node.motion, stage) {
-                    (Motion::Free, Stage::Free) => &[],
-                    (Motion::Border(masters), Stage::Border) | (Motion::Inner(masters), Stage::Inner) => {
-                        masters
-                    }
-                    _ => continue,
-                };
-                let carried: DVec3 =
-                    masters.iter().map(|&(master, weight)| weight * (moved[master] - places[master])).sum();
-                // Within the tangents first: then the return to the walls is of second order and purely normal.
-                let step =
-                    motion::tangent_projection(complex, node, places[id]) * (carried + fraction * own[id]);
-                moved[id] = complex.retracted(node, places[id] + step)?;
-            }
+        for &id in &self.layout.order_of_motion {
+            let node = &complex.nodes[id];
+            let carried: DVec3 =
+                masters(node).iter().map(|&(master, weight)| weight * (moved[master] - places[master])).sum();
+            // Within the tangents first: then the return to the walls is of second order and purely normal.
+            let own = fraction * step.own_displacements[id];
+            let step = motion::tangent_projection(complex, node, places[id]) * (carried + own);
+            moved[id] = complex.retracted(node, places[id] + step)?;
         }
         Some(moved)
     }
@@ -318,30 +394,23 @@ impl System {
     }
 
     /// The first-order displacements of all nodes.
-    fn displacements(&self, complex: &Complex, motions: &Motions, direction: &Direction) -> Places {
-        let mut moved: Places = motions
-            .columns
-            .iter()
-            .map(|columns| columns.iter().map(|&(freedom, d)| direction.freedoms[freedom] * d).sum())
-            .collect();
-        for (film, own) in self.layout.films.iter().zip(&direction.inner) {
-            for (&row, amount) in film.inner.iter().zip(own) {
-                let node = film.nodes[row].node;
-                let Motion::Inner(masters) = &complex.nodes[node].motion else { continue };
-                let carried: DVec3 = masters.iter().map(|&(master, weight)| weight * moved[master]).sum();
-                moved[node] = carried + *amount * self.frames.axis(node);
-            }
+    fn displacements(&self, complex: &Complex, places: &Places, own: &Places) -> Places {
+        let mut moved = own.clone();
+        for &id in &self.layout.order_of_motion {
+            let node = &complex.nodes[id];
+            let carried: DVec3 = masters(node).iter().map(|&(master, weight)| weight * moved[master]).sum();
+            moved[id] = motion::tangent_projection(complex, node, places[id]) * (carried + own[id]);
         }
         moved
     }
 }
 
-/// The order in which nodes move: masters first.
-#[derive(Clone, Copy)]
-enum Stage {
-    Free,
-    Border,
-    Inner,
+/// The nodes that a node follows, with their weights.
+fn masters(node: &Node) -> &[(NodeId, f64)] {
+    match &node.motion {
+        Motion::Free => &[],
+        Motion::Border(masters) | Motion::Inner(masters) => masters,
+    }
 }
 
 /// Border nodes pass the forces on them to their masters.

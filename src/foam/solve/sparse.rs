@@ -51,20 +51,36 @@ impl Symbolic {
 pub(super) struct Factored<'a> {
     symbolic: &'a Symbolic,
     matrix: SparseColMat<usize, f64>,
+    /// What was taken off the diagonal for the factorization alone.
+    softening: &'a [f64],
     values: Vec<f64>,
     /// The number of negative pivots.
     pub(super) negative: usize,
 }
 
-/// Steps of iterative refinement: each gains the digits that pivoting would have saved.
-const REFINEMENTS: usize = 3;
+/// The most steps of iterative refinement: each gains the digits that pivoting would have saved, five or more of them.
+const REFINEMENTS: usize = 8;
+/// The residual, relative to the load, above which a solution counts as none: the matrix is singular to working precision.
+const SOLVED: f64 = 1e-6;
 
 impl<'a> Factored<'a> {
-    pub(super) fn new(layout: &Layout, symbolic: &'a Symbolic, entries: &[f64]) -> Result<Self, FactorError> {
+    /// Factors the matrix with `entries`, less `softening` on its diagonal. A pressure has no diagonal of its own, and without
+    /// pivoting one that is eliminated early would be divided by nearly nothing: a little of the right sign keeps the factors
+    /// bounded (the matrix is then quasi-definite: R. J. Vanderbei, SIAM J. Optim. 5 (1995)), and the refinement of each
+    /// solution by the true matrix takes it out again.
+    pub(super) fn new(
+        layout: &Layout,
+        symbolic: &'a Symbolic,
+        mut entries: Vec<f64>,
+        softening: &'a [f64],
+    ) -> Result<Self, FactorError> {
         let unknowns = layout.unknowns;
         let memory = |_| FactorError::Memory { unknowns };
-        let matrix =
-            SparseColMat::new_from_argsort(layout.pattern.clone(), &layout.order, entries).map_err(memory)?;
+        // The diagonal comes last.
+        let diagonal = entries.len() - unknowns;
+        entries[diagonal..].iter_mut().zip(softening).for_each(|(entry, off)| *entry -= off);
+        let matrix = SparseColMat::new_from_argsort(layout.pattern.clone(), &layout.order, &entries)
+            .map_err(memory)?;
         let Symbolic(cholesky) = symbolic;
         let mut values = vec![0.0; cholesky.len_val()];
         let scratch = cholesky.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
@@ -81,11 +97,14 @@ impl<'a> Factored<'a> {
             )
             .map_err(|_| FactorError::Singular { unknowns })?;
         let negative = negative_pivots(cholesky, &values);
-        Ok(Self { symbolic, matrix, values, negative })
+        Ok(Self { symbolic, matrix, softening, values, negative })
     }
 
-    /// The solution, and the largest residual left in it.
-    pub(super) fn solve(&self, rhs: &[f64]) -> Result<(Vec<f64>, f64), FactorError> {
+    /// The solution.
+    ///
+    /// # Errors
+    /// [`FactorError::Singular`] if refinement does not settle.
+    pub(super) fn solve(&self, rhs: &[f64]) -> Result<Vec<f64>, FactorError> {
         let unknowns = rhs.len();
         let Symbolic(cholesky) = self.symbolic;
         let factor = LdltRef::new(cholesky, &self.values);
@@ -93,7 +112,8 @@ impl<'a> Factored<'a> {
         let mut buffer = MemBuffer::try_new(scratch).map_err(|_| FactorError::Memory { unknowns })?;
         let mut solution = vec![0.0; unknowns];
         let mut residual = rhs.to_vec();
-        let mut left = largest(&residual);
+        let load = largest(rhs);
+        let mut left = f64::INFINITY;
         for _ in 0..=REFINEMENTS {
             let mut correction = residual.clone();
             factor.solve_in_place_with_conj(
@@ -105,16 +125,17 @@ impl<'a> Factored<'a> {
             let candidate: Vec<f64> = solution.iter().zip(&correction).map(|(s, c)| s + c).collect();
             let next = self.residual(rhs, &candidate);
             let size = largest(&next);
-            if size.is_nan() || size >= left {
+            if size.is_nan() || size >= 0.5 * left {
                 break;
             }
             (solution, residual, left) = (candidate, next, size);
         }
-        Ok((solution, left))
+        if left <= SOLVED * load { Ok(solution) } else { Err(FactorError::Singular { unknowns }) }
     }
 
     fn residual(&self, rhs: &[f64], x: &[f64]) -> Vec<f64> {
-        let mut residual = rhs.to_vec();
+        let mut residual: Vec<f64> =
+            rhs.iter().zip(self.softening).zip(x).map(|((load, off), x)| load - off * x).collect();
         for triplet in self.matrix.triplet_iter() {
             residual[triplet.row] -= triplet.val * x[triplet.col];
             if triplet.row != triplet.col {

@@ -88,12 +88,14 @@ fn the_lagrangian_along_a_step_has_the_slope_and_the_bend_that_the_system_says()
         pressures: &pressures,
         motions: &motions,
         frames: &system.frames,
-        shift: 0.0,
     };
-    let films = system.assemble(&at);
-    let factored = Factored::new(&system.layout, &system.symbolic, &system.entries(&at, &films)).unwrap();
+    let assembled = system.assemble(&at);
+    let films = system.condense(&assembled, 0.0);
+    let softening = system.softening(&films);
+    let entries = system.entries(&films, &system.wall_entries(&at, &assembled), 0.0);
+    let factored = Factored::new(&system.layout, &system.symbolic, entries, &softening).unwrap();
     assert!(films.iter().all(|film| !film.stiffened));
-    let (loads, _) = system.loads(&complex, &films, &targets, &targets);
+    let (loads, _) = system.loads(&complex, &assembled, &IndexVec::from_elem(0.0, complex.regions.len()));
     let mut rhs = loads.clone();
     rhs.freedoms
         .iter_mut()
@@ -105,9 +107,11 @@ fn the_lagrangian_along_a_step_has_the_slope_and_the_bend_that_the_system_says()
         .zip(system.layout.of_pressure.iter())
         .for_each(|(x, unknown)| *x = unknown.map_or(0.0, |_| random.random_range(-0.1..0.1)));
     let direction = system.solve(&factored, &films, &rhs).unwrap();
+    let own_displacements = system.own_displacements(&complex, &motions, &direction);
     let step = Step {
-        displacements: system.displacements(&complex, &motions, &direction),
-        own_displacements: system.own_displacements(&complex, &motions, &direction),
+        displacements: system.displacements(&complex, &places, &own_displacements),
+        own_displacements,
+        balance: direction.pressures.clone(),
         direction,
         residuals: Residuals { force: 0.0, volume: 0.0 },
         unstable: 0,
