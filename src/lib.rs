@@ -20,6 +20,7 @@
 pub mod comb;
 pub mod compare;
 pub mod enclosure;
+pub mod evolver;
 pub mod foam;
 pub mod index;
 pub mod mesh;

@@ -8,6 +8,7 @@
 //! | `enclosure` | `enclosure.rs` |
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
+//! | `evolver check`, `evolver run` | `evolver.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
 //! | `compare` | `compare.rs` |
 //! | shell completions, manual page | `manual.rs` |
@@ -20,6 +21,7 @@ mod comb_render;
 mod comb_score;
 mod compare;
 mod enclosure;
+mod evolver;
 mod foam;
 mod foam_batch;
 mod foam_relax;
@@ -51,6 +53,8 @@ enum Command {
     Foam(Box<foam::FoamArguments>),
     /// Read the cells of comb and their numbers of sides from photographs
     Comb(Box<comb::CombArguments>),
+    /// Read, check and run datafiles of Surface Evolver
+    Evolver(evolver::EvolverArguments),
     Compare(compare::CompareArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
@@ -66,6 +70,7 @@ pub fn main() -> ExitCode {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
         Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
+        Command::Evolver(arguments) => evolver::run(&arguments),
         Command::Compare(compare) => compare::run(&compare),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
