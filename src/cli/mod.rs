@@ -7,6 +7,7 @@
 //! |---|---|
 //! | `enclosure` | `enclosure.rs` |
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
+//! | `foam bubble` | `foam_bubble.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
 //! | shell completions, manual page | `manual.rs` |
@@ -20,6 +21,7 @@ mod comb_score;
 mod enclosure;
 mod foam;
 mod foam_batch;
+mod foam_bubble;
 mod foam_relax;
 mod foam_run;
 mod foam_settings;

@@ -15,6 +15,8 @@
 //! | when a film has shrunk: T1 by geometry | `topology.rs` |
 //! | the whole descent, and its state as data | `relax/` |
 //! | who touches whom, for the comparison with combs | `pattern.rs` |
+//! | one bubble, held or free, and the landscape of its energy | `bubble/` |
+//! | foams of two layers, as in natural comb | `layers/` |
 //!
 //! Not promised: a relaxed foam is a local minimum; other seeds may lie lower. Cells must be small against the curvature of
 //! the walls: with two dozen cells in a period of the P-surface the coarse mesh of the descent is too coarse, and the run
@@ -23,8 +25,10 @@
 //! Sources: K. A. Brakke, "The Surface Evolver", Experimental Mathematics 1 (1992), for films as minimised energies;
 //! J. Nocedal and S. Wright, "Numerical Optimization" (2006), for Newton steps under constraints and inertia.
 
+pub mod bubble;
 pub mod complex;
 pub mod energy;
+pub mod layers;
 pub mod network;
 pub mod relax;
 pub mod solve;
