@@ -1,6 +1,8 @@
 //! `combwright foam`: the ideal foam between two walls.
 
-use super::{CliError, foam_batch, foam_bubble, foam_relax, foam_run, foam_settings::FoamSettings};
+use super::{
+    CliError, foam_batch, foam_bubble, foam_layers, foam_relax, foam_run, foam_settings::FoamSettings,
+};
 use crate::units::Mm;
 use std::path::PathBuf;
 
@@ -110,6 +112,7 @@ pub(super) struct SpaceArguments {
   combwright foam --recipe enclosures/paper/recipe.toml --cell-width 20mm
   combwright foam --stop-after partition --density uniform
   combwright foam --cells 32 --runs 100 -j 2
+  combwright foam --layers 2 --surface plane --periods 8,9.2376 --height 2.3 --cells 64 --pattern toth
   combwright foam --resume out/checkpoint -o out"
 )]
 pub(super) struct FoamArguments {
@@ -150,6 +153,13 @@ pub(super) struct FoamArguments {
     /// Lloyd steps after the annealing and the polish
     #[arg(long, value_name = "COUNT", default_value_t = 0, help_heading = "Cells")]
     pub(super) lloyd: usize,
+
+    /// Layers of cells: 1, or 2 as in natural comb, with --cells on each wall
+    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), conflicts_with_all = ["resume", "runs", "stop_after"], help_heading = "Layers")]
+    pub(super) layers: u8,
+    /// How the cells of two layers are arranged
+    #[arg(long, value_enum, default_value = "annealed", help_heading = "Layers")]
+    pub(super) pattern: foam_layers::PatternName,
 
     /// Quadratic elements along each film and from wall to wall [default: 2,2]
     #[arg(long, value_name = "M,K", value_delimiter = ',', help_heading = "Relaxation")]
@@ -222,6 +232,9 @@ pub(super) fn foam(arguments: &FoamArguments) -> Result<(), CliError> {
     let threads = threads.build().map_err(CliError::failure)?;
     threads.install(|| match resumed {
         Some(checkpoint) => foam_relax::resume(*checkpoint, settings),
+        None if arguments.layers == 2 => {
+            foam_layers::run(&settings, arguments.pattern, arguments.elements.is_some())
+        }
         None if settings.runs > 1 => foam_batch::run(&settings),
         None => foam_run::run(&settings),
     })

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `enclosure` | `enclosure.rs` |
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
-//! | `foam bubble` | `foam_bubble.rs` |
+//! | `foam bubble`, `foam --layers 2` | `foam_bubble.rs`, `foam_layers.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
 //! | shell completions, manual page | `manual.rs` |
@@ -22,6 +22,7 @@ mod enclosure;
 mod foam;
 mod foam_batch;
 mod foam_bubble;
+mod foam_layers;
 mod foam_relax;
 mod foam_run;
 mod foam_settings;

@@ -12,6 +12,7 @@
 //! | a relaxed foam as polygons, and for ParaView and viewers | `foam_surface.rs`, `foam_export.rs` |
 //! | the foam's picture, charts and tables; a partition's cells | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
 //! | where a bubble wants to be: table, charts, coloured surface | `bubble.rs` |
+//! | two layers of cells: picture, table | `layers.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
 
 pub mod bubble;
@@ -27,5 +28,6 @@ pub mod foam_files;
 pub mod foam_picture;
 pub mod foam_surface;
 pub mod folder;
+pub mod layers;
 pub mod palette;
 pub mod render;

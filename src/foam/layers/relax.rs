@@ -39,7 +39,7 @@ const VANISHING: f64 = 0.05;
 /// Below this part the descent stops: the elements beside such a border are slivers.
 const VANISHED: f64 = 0.004;
 /// The most Newton steps. Plane films of equal cells need about ten, annealed ones several dozen.
-const STEP_LIMIT: usize = 300;
+const STEP_LIMIT: usize = 120;
 
 /// Relaxes `division` at equal volumes on films of this fineness; `spacing` is the size of a cell, `tolerance` the largest force
 /// that may be left, in units of tension × spacing.
