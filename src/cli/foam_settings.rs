@@ -1,6 +1,6 @@
 //! From what was typed about a foam to what is meant, with all faults at once.
 
-use super::foam::{DensityName, FoamArguments, StageName, SurfaceName};
+use super::foam::{DensityName, FoamArguments, SpaceArguments, StageName, SurfaceName};
 use crate::foam::{
     complex::Strips,
     relax::RelaxSettings,
@@ -63,7 +63,7 @@ pub(super) struct FoamSettings {
 
 /// Everything that is wrong with what was typed.
 #[derive(Debug)]
-pub(super) struct Faults(Vec<String>);
+pub(super) struct Faults(pub(super) Vec<String>);
 
 impl fmt::Display for Faults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -82,10 +82,10 @@ impl std::error::Error for Faults {}
 impl FoamSettings {
     /// The settings that the arguments mean.
     pub(super) fn from_arguments(arguments: &FoamArguments) -> Result<Self, Faults> {
-        let mut faults = unused(arguments);
+        let mut faults = unused(&arguments.space);
         let space = match &arguments.recipe {
             Some(file) => recipe_space(file).map_err(|fault| Faults(vec![fault]))?,
-            None => space(arguments, &mut faults),
+            None => space(&arguments.space, &mut faults),
         };
         let mut cells = arguments.cells.unwrap_or(DEFAULT_CELLS);
         match space.gap() {
@@ -200,7 +200,7 @@ fn cells_of_width(gap: &Gap, width: Mm, faults: &mut Vec<String>) -> usize {
 }
 
 /// The space that was meant; missing and malformed numbers become faults.
-fn space(arguments: &FoamArguments, faults: &mut Vec<String>) -> FoamSpace {
+pub(super) fn space(arguments: &SpaceArguments, faults: &mut Vec<String>) -> FoamSpace {
     match arguments.surface {
         SurfaceName::SchwarzP => periodic(arguments, PeriodicSurface::SchwarzP),
         SurfaceName::Gyroid => periodic(arguments, PeriodicSurface::Gyroid),
@@ -219,7 +219,7 @@ fn space(arguments: &FoamArguments, faults: &mut Vec<String>) -> FoamSpace {
     }
 }
 
-fn periodic(arguments: &FoamArguments, kind: PeriodicSurface) -> FoamSpace {
+fn periodic(arguments: &SpaceArguments, kind: PeriodicSurface) -> FoamSpace {
     let walls = match arguments.parallel {
         Some(gap) => PeriodicWalls::Parallel { gap },
         None => PeriodicWalls::LevelSet { delta: arguments.delta.unwrap_or(0.2) },
@@ -249,7 +249,7 @@ fn pair(option: &str, values: Option<&[f64]>, faults: &mut Vec<String>) -> [f64;
 }
 
 /// Options that the chosen surface does not have: better said than ignored.
-fn unused(arguments: &FoamArguments) -> Vec<String> {
+pub(super) fn unused(arguments: &SpaceArguments) -> Vec<String> {
     let kind = match arguments.surface {
         SurfaceName::SchwarzP | SurfaceName::Gyroid | SurfaceName::Diamond => "a triply periodic surface",
         SurfaceName::Sphere => "a sphere",

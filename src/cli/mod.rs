@@ -7,6 +7,7 @@
 //! |---|---|
 //! | `enclosure` | `enclosure.rs` |
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
+//! | `foam bubble`, `foam --layers 2` | `foam_bubble.rs`, `foam_layers.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `evolver check`, `evolver run` | `evolver.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
@@ -24,6 +25,8 @@ mod enclosure;
 mod evolver;
 mod foam;
 mod foam_batch;
+mod foam_bubble;
+mod foam_layers;
 mod foam_relax;
 mod foam_run;
 mod foam_settings;

@@ -16,6 +16,8 @@
 //! | the descent of any film complex; the whole run with its T1s, and its state as data | `relax/` |
 //! | pressures against sides and curvature, cell by cell | `audit.rs` |
 //! | who touches whom, for the comparison with combs | `pattern.rs` |
+//! | one bubble, held or free, and the landscape of its energy | `bubble/` |
+//! | foams of two layers, as in natural comb | `layers/` |
 //!
 //! Not promised: a relaxed foam is a local minimum; other seeds may lie lower. Cells must be small against the curvature of
 //! the walls: with two dozen cells in a period of the P-surface the coarse mesh of the descent is too coarse, and the run
@@ -25,8 +27,10 @@
 //! J. Nocedal and S. Wright, "Numerical Optimization" (2006), for Newton steps under constraints and inertia.
 
 pub mod audit;
+pub mod bubble;
 pub mod complex;
 pub mod energy;
+pub mod layers;
 pub mod network;
 pub mod relax;
 pub mod solve;

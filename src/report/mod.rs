@@ -11,9 +11,12 @@
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
 //! | a relaxed foam as polygons, and for ParaView and viewers | `foam_surface.rs`, `foam_export.rs` |
 //! | the foam's picture, charts and tables; a partition's cells | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
+//! | where a bubble wants to be: table, charts, coloured surface | `bubble.rs` |
+//! | two layers of cells: picture, table | `layers.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
 //! | a comparison's charts, tables and files | `compare_charts.rs`, `compare_map.rs`, `compare_files.rs` |
 
+pub mod bubble;
 pub mod comb;
 mod comb_overlay;
 pub mod compare_charts;
@@ -29,5 +32,6 @@ pub mod foam_files;
 pub mod foam_picture;
 pub mod foam_surface;
 pub mod folder;
+pub mod layers;
 pub mod palette;
 pub mod render;
