@@ -80,7 +80,7 @@ fn flat_foam(cells: u32, period: f64, exact: f64) -> Result<(), Box<dyn Error>> 
 }
 
 /// CPU seconds of Surface Evolver's best script until its energy is within 1.2e-4 of the exact one, or as near as it comes;
-/// the script prints its clock and twice the energy of the half films.
+/// the script prints its clock and its energy.
 fn evolver(cells: u32, exact: f64) -> Option<(f64, f64)> {
     let folder = Path::new(FOAMS).canonicalize().ok()?;
     let output = Command::new("sh")
@@ -98,7 +98,7 @@ fn evolver(cells: u32, exact: f64) -> Option<(f64, f64)> {
     let reports: Vec<(f64, f64)> = text
         .lines()
         .filter(|line| line.contains("REP"))
-        .filter_map(|line| Some((figure(line, "clk")?, figure(line, "2xen")? / exact - 1.0)))
+        .filter_map(|line| Some((figure(line, "clk")?, figure(line, "en")? / exact - 1.0)))
         .collect();
     let near = reports.iter().find(|(_, error)| error.abs() < 1.2e-4).or(reports.last())?;
     Some(*near)
