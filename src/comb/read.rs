@@ -15,7 +15,7 @@ use super::{
     watershed::{self, Segmentation},
 };
 use glam::DVec2;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::RangeInclusive};
 
 /// Pixels per pitch that the reading works at: larger photographs are reduced to it. At 36 a wall of a tenth of the pitch
 /// is 3 to 4 pixels long, which is enough to see it; more costs time and shows more of the wax's grain.
@@ -35,9 +35,9 @@ const HALVES_RISE: f64 = 0.55;
 const HALVES_AREA: f64 = 1.65;
 const HALVES_DISTANCE: f64 = 0.78;
 /// An inferred place is a corner of another one's cell behind no more than a sunken wall: less than this share of a cell,
-/// no more than this together with the other, and a wall of no more than this share of the usual rise.
-const CORNER_AREA: f64 = 0.5;
-const CORNER_TOTAL: f64 = 1.4;
+/// together with the other about one cell, and a wall of no more than this share of the usual rise.
+const CORNER_AREA: f64 = 0.45;
+const CORNER_TOTAL: RangeInclusive<f64> = 0.8..=1.4;
 const CORNER_RISE: f64 = 0.8;
 
 /// A cell that the border cuts is a sliver if less than this share of its outline is seen.
@@ -223,9 +223,10 @@ fn halves(
             (false, false) => false,
         };
         let both = found(a) && found(b);
-        let (rise_limit, area) = if both { (HALVES_RISE, HALVES_AREA) } else { (CORNER_RISE, CORNER_TOTAL) };
+        let (rise_limit, total) =
+            if both { (HALVES_RISE, 0.0..=HALVES_AREA) } else { (CORNER_RISE, CORNER_TOTAL) };
         let open = rise(*pair, wall) < rise_limit * typical;
-        let sized = regions[a].area + regions[b].area < area * cell;
+        let sized = total.contains(&((regions[a].area + regions[b].area) / cell));
         let close = regions[a].centroid.distance(regions[b].centroid) < HALVES_DISTANCE * pitch;
         if halves && open && sized && close && !joined[a] && !joined[b] {
             let (kept, gone) = if found(a) { (a, b) } else { (b, a) };
