@@ -9,7 +9,8 @@
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
-//! | `compare` | `compare.rs` |
+//! | `compare` | `compare.rs`, `compare_wall.rs` |
+//! | `demo`, `view` | `demo.rs`, `demo_comb.rs`, `view.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
@@ -19,6 +20,9 @@ mod comb;
 mod comb_render;
 mod comb_score;
 mod compare;
+mod compare_wall;
+mod demo;
+mod demo_comb;
 mod enclosure;
 mod foam;
 mod foam_batch;
@@ -29,6 +33,7 @@ mod interrupt;
 mod manual;
 mod outcome;
 mod progress;
+mod view;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
@@ -52,6 +57,8 @@ enum Command {
     /// Read the cells of comb and their numbers of sides from photographs
     Comb(Box<comb::CombArguments>),
     Compare(compare::CompareArguments),
+    Demo(demo::DemoArguments),
+    View(view::ViewArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -67,6 +74,8 @@ pub fn main() -> ExitCode {
         Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
         Command::Compare(compare) => compare::run(&compare),
+        Command::Demo(demo) => demo::run(&demo),
+        Command::View(view) => view::run(&view),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };
