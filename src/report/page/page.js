@@ -145,7 +145,7 @@
     look(direction) {
       const narrow = Math.min(1, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight));
       this.controls.target.copy(this.middle);
-      this.camera.position.copy(this.middle).addScaledVector(direction.normalize(), (1.5 * this.size) / narrow);
+      this.camera.position.copy(this.middle).addScaledVector(direction.normalize(), (1.75 * this.size) / narrow);
       this.camera.near = 0.02 * this.size;
       this.camera.far = 20 * this.size;
       this.camera.updateProjectionMatrix();
