@@ -59,8 +59,8 @@ pub(super) struct Made {
     pub(super) relaxed: Relaxed,
     pub(super) record: Vec<StepRecord>,
     pub(super) figures: Figures,
-    pattern: CellPattern,
-    cells: CellFigures,
+    pub(super) pattern: CellPattern,
+    pub(super) cells: CellFigures,
 }
 
 /// The figures of a foam: `summary.json`.

@@ -173,13 +173,18 @@ fn recipe_space(file: &Path) -> Result<FoamSpace, String> {
     let text = fs::read_to_string(file).map_err(|error| named(&error))?;
     let recipe = Recipe::parse(&text).map_err(|error| named(&error))?;
     let design = Design::new(&recipe).map_err(|error| named(&error))?;
+    Ok(space_of(&design))
+}
+
+/// One whole period of a design's gap, in mm.
+pub(super) fn space_of(design: &Design) -> FoamSpace {
     let [lower, upper] = design.gap.walls();
     let period = design.period.0;
     let walls = match design.gap.kind() {
         GapKind::LevelSet => PeriodicWalls::LevelSet { delta: upper.level },
         GapKind::Parallel => PeriodicWalls::Parallel { gap: (upper.level - lower.level) * period },
     };
-    Ok(FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period, walls })
+    FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period, walls }
 }
 
 /// How many hexagons of this width cover the middle surface.

@@ -11,7 +11,8 @@
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
 //! | `evolver check`, `evolver run` | `evolver.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
-//! | `compare` | `compare.rs` |
+//! | `compare` | `compare.rs`, `compare_wall.rs` |
+//! | `demo`, `view` | `demo.rs`, `demo_comb.rs`, `view.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
@@ -21,6 +22,9 @@ mod comb;
 mod comb_render;
 mod comb_score;
 mod compare;
+mod compare_wall;
+mod demo;
+mod demo_comb;
 mod enclosure;
 mod evolver;
 mod foam;
@@ -34,6 +38,7 @@ mod interrupt;
 mod manual;
 mod outcome;
 mod progress;
+mod view;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
@@ -59,6 +64,8 @@ enum Command {
     /// Read, check and run datafiles of Surface Evolver
     Evolver(evolver::EvolverArguments),
     Compare(compare::CompareArguments),
+    Demo(demo::DemoArguments),
+    View(view::ViewArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -75,6 +82,8 @@ pub fn main() -> ExitCode {
         Command::Comb(comb) => comb::run(&comb),
         Command::Evolver(arguments) => evolver::run(&arguments),
         Command::Compare(compare) => compare::run(&compare),
+        Command::Demo(demo) => demo::run(&demo),
+        Command::View(view) => view::run(&view),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };
