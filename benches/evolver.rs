@@ -88,10 +88,66 @@ fn speed() {
 }
 
 const WORDS: [&str; 60] = [
-    "vertices", "edges", "faces", "bodies", "read", "constraint", "formula:", "content:", "c1:", "e1:", "parameter",
-    "x", "y", "^", "1", "-3", "2.5e3", "1e999", "(", ")", "{", "}", "[", "]", ":=", "+=", ";", ",", ":", "?", "*", "/",
-    "where", "foreach", "do", "if", "then", "else", "while", "for", "sum(", "max(", "edge", "vertex", "facet", "body",
-    ".", "\"%d %g %s\\n\"", "printf", "g 1", "r", "u", "V", "hessian", "set", "#define A B", "A", "\n", "volume", "torus",
+    "vertices",
+    "edges",
+    "faces",
+    "bodies",
+    "read",
+    "constraint",
+    "formula:",
+    "content:",
+    "c1:",
+    "e1:",
+    "parameter",
+    "x",
+    "y",
+    "^",
+    "1",
+    "-3",
+    "2.5e3",
+    "1e999",
+    "(",
+    ")",
+    "{",
+    "}",
+    "[",
+    "]",
+    ":=",
+    "+=",
+    ";",
+    ",",
+    ":",
+    "?",
+    "*",
+    "/",
+    "where",
+    "foreach",
+    "do",
+    "if",
+    "then",
+    "else",
+    "while",
+    "for",
+    "sum(",
+    "max(",
+    "edge",
+    "vertex",
+    "facet",
+    "body",
+    ".",
+    "\"%d %g %s\\n\"",
+    "printf",
+    "g 1",
+    "r",
+    "u",
+    "V",
+    "hessian",
+    "set",
+    "#define A B",
+    "A",
+    "\n",
+    "volume",
+    "torus",
 ];
 
 /// Random bytes, random words, and mutations of a sound file; a session runs what can be read.
@@ -103,12 +159,17 @@ fn fuzz(seconds: u64) {
     while Instant::now() < end {
         let text = match count % 3 {
             0 => {
-                let bytes: Vec<u8> = (0..random.random_range(0..300)).map(|_| random.random_range(0..=255)).collect();
+                let bytes: Vec<u8> =
+                    (0..random.random_range(0..300)).map(|_| random.random_range(0..=255)).collect();
                 String::from_utf8_lossy(&bytes).into_owned()
             }
-            1 => (0..random.random_range(0..80)).map(|_| WORDS[random.random_range(0..WORDS.len())]).collect::<Vec<_>>().join(" "),
+            1 => (0..random.random_range(0..80))
+                .map(|_| WORDS[random.random_range(0..WORDS.len())])
+                .collect::<Vec<_>>()
+                .join(" "),
             _ => {
-                let mut bytes = format!("{CUBE}read\nr; g 2; u; V; printf \"%g\", total_energy; hessian\n").into_bytes();
+                let mut bytes =
+                    format!("{CUBE}read\nr; g 2; u; V; printf \"%g\", total_energy; hessian\n").into_bytes();
                 for _ in 0..random.random_range(1..8) {
                     let at = random.random_range(0..bytes.len());
                     bytes[at] = b" 0123456789-+.*/()[]{};:=\nabcdefgvx"[random.random_range(0..36)];

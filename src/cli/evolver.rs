@@ -78,7 +78,9 @@ pub(super) fn run(arguments: &EvolverArguments) -> Result<(), CliError> {
 /// What a user wrote wrongly is a mistake; the rest is a failure.
 fn ended(error: EvolverError) -> CliError {
     match error {
-        EvolverError::Numerical(_) | EvolverError::Interrupted | EvolverError::Budget(_) => CliError::failure(error),
+        EvolverError::Numerical(_) | EvolverError::Interrupted | EvolverError::Budget(_) => {
+            CliError::failure(error)
+        }
         _ => CliError::mistake(error),
     }
 }
@@ -138,7 +140,10 @@ fn summary(document: &Document) -> String {
     for quantity in &data.quantities {
         line("quantity", format!("{} ({:?})", quantity.name, quantity.purpose));
     }
-    line("vertices", format!("{} in the file, {} with the middles of faces", data.vertices.len(), surface.vertices.len()));
+    line(
+        "vertices",
+        format!("{} in the file, {} with the middles of faces", data.vertices.len(), surface.vertices.len()),
+    );
     line("edges", format!("{} in the file, {} triangulated", data.edges.len(), surface.edges.len()));
     line("faces", format!("{} in the file, {} triangulated", data.faces.len(), surface.facets.len()));
     line("bodies", format!("{}", data.bodies.len()));
@@ -166,7 +171,8 @@ impl Host for Terminal {
 
     fn write(&mut self, name: &str, text: &str, append: bool) -> Result<(), io::Error> {
         let path = self.folder.join(name);
-        let mut file = fs::OpenOptions::new().create(true).write(true).append(append).truncate(!append).open(path)?;
+        let mut file =
+            fs::OpenOptions::new().create(true).write(true).append(append).truncate(!append).open(path)?;
         file.write_all(text.as_bytes())
     }
 
@@ -188,18 +194,23 @@ fn run_file(arguments: &RunArguments) -> Result<(), CliError> {
         && let Some(fault) = document.faults.iter().find(|fault| fault.is_grave())
     {
         let line = fault.position().line;
-        return Err(CliError::mistake(anyhow!("{name}: line {line}: {fault} (--as-printed runs it all the same)")));
+        return Err(CliError::mistake(anyhow!(
+            "{name}: line {line}: {fault} (--as-printed runs it all the same)"
+        )));
     }
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from("."));
-    fs::create_dir_all(&folder)
-        .map_err(|error| CliError::mistake(anyhow!("the folder {} cannot be made: {error}", folder.display())))?;
+    fs::create_dir_all(&folder).map_err(|error| {
+        CliError::mistake(anyhow!("the folder {} cannot be made: {error}", folder.display()))
+    })?;
     interrupt::listen();
     let mut host = Terminal { folder };
     let read_section = std::mem::take(&mut document.commands);
     let mut session = Session::new(document).map_err(ended)?;
     session.set_budget(arguments.max_commands);
     let flow = session.run(&source, &read_section, &mut host);
-    let flow = flow.and_then(|flow| if flow == Flow::Quit { Ok(flow) } else { all_commands(arguments, &mut session, &mut host) });
+    let flow = flow.and_then(|flow| {
+        if flow == Flow::Quit { Ok(flow) } else { all_commands(arguments, &mut session, &mut host) }
+    });
     if let Err(error) = flow {
         save_interrupted(&mut session, &mut host, &error);
         return Err(ended(error));
@@ -277,8 +288,10 @@ fn table(session: &mut Session) -> Result<String, EvolverError> {
     let _ = writeln!(text, "{:<16}{}", "energy", significant(values.energy, 15));
     let _ = writeln!(text, "{:<16}{}", "area", significant(values.area, 15));
     for body in session.bodies()? {
-        let closed = body.closed.map_or(String::new(), |closed| format!("  closed {}", significant(closed, 15)));
-        let target = body.target.map_or(String::new(), |target| format!("  target {}", significant(target, 15)));
+        let closed =
+            body.closed.map_or(String::new(), |closed| format!("  closed {}", significant(closed, 15)));
+        let target =
+            body.target.map_or(String::new(), |target| format!("  target {}", significant(target, 15)));
         let name = format!("body {}", body.id);
         let _ = writeln!(
             text,

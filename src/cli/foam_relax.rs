@@ -354,7 +354,8 @@ pub(super) fn write_all(
     }
     if let Some(name) = &settings.write_fe {
         let complex = state.strips.complex(&state.network, gap);
-        let title = format!("{}, N = {}, by combwright {}", job.space, made.figures.cells, env!("CARGO_PKG_VERSION"));
+        let title =
+            format!("{}, N = {}, by combwright {}", job.space, made.figures.cells, env!("CARGO_PKG_VERSION"));
         let text = foam_datafile(&job.space, &complex, &state.places, &title).map_err(CliError::mistake)?;
         folder.write_bytes(name.as_str(), text.as_bytes())?;
     }

@@ -21,9 +21,9 @@ pub mod command;
 pub mod datafile;
 pub mod error;
 pub mod language;
-pub mod source;
 pub mod physics;
 pub mod session;
+pub mod source;
 pub mod surface;
 
 pub use error::EvolverError;

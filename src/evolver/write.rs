@@ -107,7 +107,9 @@ fn head(space: &FoamSpace, complex: &Complex, places: &Places, title: &str) -> R
                 push(format!("PARAMETER level{} = {}", wall + 1, level(wall)));
                 let formula = match kind {
                     PeriodicSurface::SchwarzP => "cos(kk*x) + cos(kk*y) + cos(kk*z)",
-                    PeriodicSurface::Gyroid => "sin(kk*x)*cos(kk*y) + sin(kk*y)*cos(kk*z) + sin(kk*z)*cos(kk*x)",
+                    PeriodicSurface::Gyroid => {
+                        "sin(kk*x)*cos(kk*y) + sin(kk*y)*cos(kk*z) + sin(kk*z)*cos(kk*x)"
+                    }
                     PeriodicSurface::Diamond => {
                         "cos(kk*x)*cos(kk*y)*cos(kk*z) - sin(kk*x)*sin(kk*y)*sin(kk*z)"
                     }
@@ -216,7 +218,8 @@ impl Writer<'_> {
         let complex = self.complex;
         for film in &complex.films {
             for element in &film.elements {
-                let nodes: Vec<(Vertex, IVec3)> = element.nodes.iter().map(|&image| self.image(image)).collect();
+                let nodes: Vec<(Vertex, IVec3)> =
+                    element.nodes.iter().map(|&image| self.image(image)).collect();
                 for corners in triangles(element.shape) {
                     let corners = corners.map(|at| nodes[at]);
                     let face = self.face(corners, &format!("tension {}", number(film.tension)))?;
@@ -295,9 +298,8 @@ fn triangles(shape: Shape) -> Vec<[usize; 3]> {
     match shape {
         Shape::Tri3 => vec![[0, 1, 2]],
         Shape::Tri6 => vec![[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-        Shape::Quad9 => [0, 1, 3, 4]
-            .into_iter()
-            .flat_map(|a| [[a, a + 1, a + 4], [a, a + 4, a + 3]])
-            .collect(),
+        Shape::Quad9 => {
+            [0, 1, 3, 4].into_iter().flat_map(|a| [[a, a + 1, a + 4], [a, a + 4, a + 3]]).collect()
+        }
     }
 }

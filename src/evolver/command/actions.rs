@@ -13,19 +13,67 @@ type Parsed = Result<Action, EvolverError>;
 
 /// Switches; those that change nothing here are known by name only.
 const TOGGLES: [&str; 46] = [
-    "quiet", "gravity", "conj_grad", "hessian_normal", "hessian_quiet", "autorecalc", "show_all_edges",
-    "metric_conversion", "gv_binary", "force_deletion", "memdebug", "runge_kutta", "diffusion",
-    "check_increase", "autodisplay", "shading", "clip_view", "quietgo", "quietload", "pinning", "post_project",
-    "normal_motion", "area_normalization", "itdebug", "kraynikpopedge", "kraynikpopvertex", "view_4d",
-    "linear_metric", "line_search", "kusner", "conf_edge", "sparse_constraints", "ysmp", "thicken", "debug",
-    "calculus_warnings", "break_after_warning", "bezier_basis", "raw_cells", "show_inner", "show_outer",
-    "hessian_special_normal", "big_endian", "little_endian", "verbose", "convert_to_quantities",
+    "quiet",
+    "gravity",
+    "conj_grad",
+    "hessian_normal",
+    "hessian_quiet",
+    "autorecalc",
+    "show_all_edges",
+    "metric_conversion",
+    "gv_binary",
+    "force_deletion",
+    "memdebug",
+    "runge_kutta",
+    "diffusion",
+    "check_increase",
+    "autodisplay",
+    "shading",
+    "clip_view",
+    "quietgo",
+    "quietload",
+    "pinning",
+    "post_project",
+    "normal_motion",
+    "area_normalization",
+    "itdebug",
+    "kraynikpopedge",
+    "kraynikpopvertex",
+    "view_4d",
+    "linear_metric",
+    "line_search",
+    "kusner",
+    "conf_edge",
+    "sparse_constraints",
+    "ysmp",
+    "thicken",
+    "debug",
+    "calculus_warnings",
+    "break_after_warning",
+    "bezier_basis",
+    "raw_cells",
+    "show_inner",
+    "show_outer",
+    "hessian_special_normal",
+    "big_endian",
+    "little_endian",
+    "verbose",
+    "convert_to_quantities",
 ];
 
 /// Commands of the display: there is none here.
 const DISPLAY: [&str; 11] = [
-    "show", "showq", "show_off", "geomview", "postscript", "zoom", "view_matrix", "transform_expr", "binary_off",
-    "ps_colorflag", "geompipe",
+    "show",
+    "showq",
+    "show_off",
+    "geomview",
+    "postscript",
+    "zoom",
+    "view_matrix",
+    "transform_expr",
+    "binary_off",
+    "ps_colorflag",
+    "geompipe",
 ];
 
 /// Commands of Surface Evolver that are not supported, with the nearest way to do it.
@@ -117,7 +165,7 @@ pub(super) fn action(cursor: &mut Cursor, word: &str) -> Parsed {
     if let Some((_, hint)) = REFUSED.iter().find(|(name, _)| *name == word) {
         cursor.bump();
         skip_statement(cursor);
-        return Ok(Action::Refused(word.into(), hint));
+        return Ok(Action::Refused(word.into(), *hint));
     }
     cursor.bump();
     if let Some(parsed) = element_command(cursor, word) {
@@ -135,7 +183,8 @@ pub(super) fn action(cursor: &mut Cursor, word: &str) -> Parsed {
     }
     // A procedure's name stands alone; anything else is an expression whose value is shown.
     let ends = cursor.at_end() || cursor.token().first_on_line;
-    let separated = matches!(cursor.kind(), TokenKind::Symbol(";" | "}" | ")" | ">>" | "|") | TokenKind::Number(..));
+    let separated =
+        matches!(cursor.kind(), TokenKind::Symbol(";" | "}" | ")" | ">>" | "|") | TokenKind::Number(..));
     if ends || separated || cursor.word().is_some() {
         return Ok(Action::Call(word.into()));
     }
@@ -243,14 +292,25 @@ fn define(cursor: &mut Cursor) -> Parsed {
     let word = cursor.expect_word()?;
     match ElementKind::named(&word) {
         Some(kind) => parse_extra_attribute(cursor, kind).map(Action::DefineAttribute),
-        None => cursor.unsupported(position, &format!("define {word} in commands"), "define it in the datafile"),
+        None => {
+            cursor.unsupported(position, &format!("define {word} in commands"), "define it in the datafile")
+        }
     }
 }
 
 fn list(cursor: &mut Cursor) -> Parsed {
     if let Some(word) = cursor.word()
-        && ["topinfo", "bottominfo", "attributes", "procedures", "constraint", "boundary", "quantity", "variables"]
-            .contains(&word.as_str())
+        && [
+            "topinfo",
+            "bottominfo",
+            "attributes",
+            "procedures",
+            "constraint",
+            "boundary",
+            "quantity",
+            "variables",
+        ]
+        .contains(&word.as_str())
     {
         cursor.bump();
         while matches!(cursor.kind(), TokenKind::Number(..)) && !cursor.token().first_on_line {
@@ -298,7 +358,10 @@ fn element_command(cursor: &mut Cursor, word: &str) -> Option<Parsed> {
 
 fn set(cursor: &mut Cursor) -> Parsed {
     let (mut query, attribute, index) = attribute_of(cursor)?;
-    let bare = matches!(attribute.as_str(), "fixed" | "no_refine" | "bare" | "noncontent" | "no_display" | "hit_constraint");
+    let bare = matches!(
+        attribute.as_str(),
+        "fixed" | "no_refine" | "bare" | "noncontent" | "no_display" | "hit_constraint"
+    );
     cursor.accept(":=");
     let value = if bare { None } else { Some(value(cursor)?) };
     if cursor.accept_word("where") {
@@ -346,7 +409,9 @@ fn attribute_of(
     // The word taken for a name is the attribute if no other follows.
     let ends = cursor.at_end() || cursor.token().first_on_line;
     let (query, attribute) = match (query.name.clone(), cursor.word()) {
-        (Some(name), next) if ends || next.is_none() || next.as_deref() == Some("where") || !is_attribute_word(cursor) => {
+        (Some(name), next)
+            if ends || next.is_none() || next.as_deref() == Some("where") || !is_attribute_word(cursor) =>
+        {
             (crate::evolver::language::expression::Query { name: None, ..query }, name.to_string())
         }
         (_, Some(_)) => (query, cursor.expect_word()?),
@@ -365,8 +430,23 @@ fn attribute_of(
 /// Whether the word here can be an attribute that follows an element's name.
 fn is_attribute_word(cursor: &Cursor) -> bool {
     let known = [
-        "x", "y", "z", "fixed", "constraint", "tension", "density", "color", "volume", "target", "pressure",
-        "volconst", "no_refine", "boundary", "frontcolor", "backcolor", "opacity",
+        "x",
+        "y",
+        "z",
+        "fixed",
+        "constraint",
+        "tension",
+        "density",
+        "color",
+        "volume",
+        "target",
+        "pressure",
+        "volconst",
+        "no_refine",
+        "boundary",
+        "frontcolor",
+        "backcolor",
+        "opacity",
     ];
     cursor.word().is_some_and(|word| known.contains(&word.as_str()))
 }

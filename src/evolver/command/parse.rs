@@ -39,7 +39,11 @@ pub(super) fn statement(cursor: &mut Cursor) -> Result<Statement, EvolverError> 
             action = Action::Repeat(Box::new(Statement { position, action }), count);
         } else if here && (cursor.is_symbol(">>") || cursor.is_symbol("|")) {
             if cursor.accept("|") {
-                return cursor.unsupported(position, "a pipe to another program", "redirect to a file with >>");
+                return cursor.unsupported(
+                    position,
+                    "a pipe to another program",
+                    "redirect to a file with >>",
+                );
             }
             cursor.bump();
             let name = cursor.postfix()?;
@@ -56,7 +60,9 @@ pub(super) fn statement(cursor: &mut Cursor) -> Result<Statement, EvolverError> 
 fn repeatable(action: &Action) -> bool {
     matches!(
         action,
-        Action::Block(_) | Action::Call(_) | Action::Simple(Simple::Refine | Simple::Equiangulate | Simple::Average | Simple::Hessian)
+        Action::Block(_)
+            | Action::Call(_)
+            | Action::Simple(Simple::Refine | Simple::Equiangulate | Simple::Average | Simple::Hessian)
     )
 }
 
@@ -77,11 +83,22 @@ fn block(cursor: &mut Cursor) -> Parsed {
         }
         let compound = cursor.is_symbol("{");
         out.push(statement(cursor)?);
-        let ended_with_block = compound || matches!(
-            out.last().map(|s| &s.action),
-            Some(Action::If(..) | Action::While(..) | Action::For(..) | Action::Foreach(..) | Action::DoWhile(..))
-        );
-        if !cursor.is_symbol(";") && !cursor.is_symbol("}") && !ended_with_block && !cursor.token().first_on_line {
+        let ended_with_block = compound
+            || matches!(
+                out.last().map(|s| &s.action),
+                Some(
+                    Action::If(..)
+                        | Action::While(..)
+                        | Action::For(..)
+                        | Action::Foreach(..)
+                        | Action::DoWhile(..)
+                )
+            );
+        if !cursor.is_symbol(";")
+            && !cursor.is_symbol("}")
+            && !ended_with_block
+            && !cursor.token().first_on_line
+        {
             return cursor.expected("«;» or «}»");
         }
     }
@@ -236,7 +253,9 @@ fn assignment(cursor: &mut Cursor) -> Result<Option<Action>, EvolverError> {
         return Ok(Some(Action::Define(name.clone(), Arc::new(body))));
     }
     let value = cursor.expression()?;
-    if matches!(value, Expression::Text(_)) || matches!(&value, Expression::Call(name, _, _) if &**name == "sprintf") {
+    if matches!(value, Expression::Text(_))
+        || matches!(&value, Expression::Call(name, _, _) if &**name == "sprintf")
+    {
         return Ok(Some(Action::AssignText(name.clone(), value)));
     }
     Ok(Some(Action::Assign(name.clone(), operator, value)))

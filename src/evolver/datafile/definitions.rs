@@ -241,7 +241,11 @@ impl Reader {
             }
         }
         if self.cursor.accept(";") {
-            return self.cursor.unsupported(position, "a function's prototype", "define functions before their use");
+            return self.cursor.unsupported(
+                position,
+                "a function's prototype",
+                "define functions before their use",
+            );
         }
         self.cursor.expect("{")?;
         if !self.cursor.accept_word("return") {
@@ -263,7 +267,8 @@ impl Reader {
             if self.cursor.accept(",") {
                 continue;
             }
-            let more = matches!(self.cursor.kind(), TokenKind::Number(_, true)) && !self.cursor.token().first_on_line;
+            let more = matches!(self.cursor.kind(), TokenKind::Number(_, true))
+                && !self.cursor.token().first_on_line;
             let named = self.cursor.word().is_some_and(|word| {
                 !self.cursor.token().first_on_line && self.data.constraints.iter().any(|c| *c.name == *word)
             });

@@ -8,8 +8,22 @@ use crate::evolver::{
 
 /// Colours by name; their places are Surface Evolver's numbers.
 pub(crate) const COLORS: [&str; 16] = [
-    "black", "blue", "green", "cyan", "red", "magenta", "brown", "lightgray", "darkgray", "lightblue",
-    "lightgreen", "lightcyan", "lightred", "lightmagenta", "yellow", "white",
+    "black",
+    "blue",
+    "green",
+    "cyan",
+    "red",
+    "magenta",
+    "brown",
+    "lightgray",
+    "darkgray",
+    "lightblue",
+    "lightgreen",
+    "lightcyan",
+    "lightred",
+    "lightmagenta",
+    "yellow",
+    "white",
 ];
 
 /// More elements than this are refused before they exhaust the memory.
@@ -21,7 +35,9 @@ impl Reader {
         let count =
             self.data.vertices.len() + self.data.edges.len() + self.data.faces.len() + self.data.bodies.len();
         if count > ELEMENT_LIMIT {
-            return self.cursor.invalid(self.cursor.position(), format!("more than {ELEMENT_LIMIT} elements"));
+            return self
+                .cursor
+                .invalid(self.cursor.position(), format!("more than {ELEMENT_LIMIT} elements"));
         }
         Ok(matches!(self.cursor.kind(), TokenKind::Number(_, true)))
     }
@@ -37,7 +53,10 @@ impl Reader {
             let position = self.cursor.position();
             let id = self.cursor.integer()?;
             let mut numbers = Vec::new();
-            while !self.cursor.token().first_on_line && !self.cursor.at_end() && !self.at_attribute(ElementKind::Vertex) {
+            while !self.cursor.token().first_on_line
+                && !self.cursor.at_end()
+                && !self.at_attribute(ElementKind::Vertex)
+            {
                 numbers.push(self.number()?);
                 self.cursor.accept(",");
             }
@@ -152,7 +171,9 @@ impl Reader {
             }
             let position = self.cursor.position();
             let Some(word) = self.cursor.word() else {
-                return self.cursor.expected(&format!("an attribute of the {}, or the next line", kind.name()));
+                return self
+                    .cursor
+                    .expected(&format!("an attribute of the {}, or the next line", kind.name()));
             };
             self.cursor.bump();
             match word.as_str() {
@@ -194,7 +215,8 @@ impl Reader {
         kind: ElementKind,
         out: &mut Attributes,
     ) -> Result<(), EvolverError> {
-        let extra = self.data.extra_attributes.iter().find(|extra| extra.kind == kind && *extra.name == *word);
+        let extra =
+            self.data.extra_attributes.iter().find(|extra| extra.kind == kind && *extra.name == *word);
         if let Some(extra) = extra.cloned() {
             let braces = self.cursor.accept("{");
             let mut values = Vec::with_capacity(extra.length);
@@ -237,8 +259,31 @@ impl Reader {
 
 /// Words that begin an attribute in the line of a vertex.
 const ATTRIBUTES: [&str; 27] = [
-    "fixed", "constraint", "constraints", "boundary", "tension", "density", "color", "frontcolor", "backcolor",
-    "original", "no_refine", "noncontent", "volume", "volconst", "pressure", "lagrange_multiplier",
-    "actual_volume", "opacity", "bare", "no_display", "nodisplay", "no_transform", "centerofmass", "orientation",
-    "wrap", "axial_point", "hit_partner",
+    "fixed",
+    "constraint",
+    "constraints",
+    "boundary",
+    "tension",
+    "density",
+    "color",
+    "frontcolor",
+    "backcolor",
+    "original",
+    "no_refine",
+    "noncontent",
+    "volume",
+    "volconst",
+    "pressure",
+    "lagrange_multiplier",
+    "actual_volume",
+    "opacity",
+    "bare",
+    "no_display",
+    "nodisplay",
+    "no_transform",
+    "centerofmass",
+    "orientation",
+    "wrap",
+    "axial_point",
+    "hit_partner",
 ];

@@ -3,25 +3,62 @@
 use super::{Model, Reader, Representation};
 use crate::evolver::{
     error::EvolverError,
-    language::{TokenKind, expression::{ElementKind, Expression, UnaryOperator}, formula::GRAVITY},
+    language::{
+        TokenKind,
+        expression::{ElementKind, Expression, UnaryOperator},
+        formula::GRAVITY,
+    },
     source::Position,
 };
 use glam::DMat3;
 
 /// Settings of a word and a number that change nothing here.
 const IGNORED_NUMBERS: [&str; 27] = [
-    "vertices_predicted", "edges_predicted", "facets_predicted", "facetedges_predicted", "bodies_predicted",
-    "quantities_predicted", "method_instances_predicted", "evolver_version", "total_time", "zoom_vertex",
-    "zoom_radius", "tolerance", "constraint_tolerance", "target_tolerance", "runge_kutta_flag", "jiggle_temperature", "temperature",
-    "scrollscale", "linewidth", "thickness", "hessian_epsilon", "brightness", "clip_coeff", "slice_coeff", "merit_factor",
-    "area_weighting", "pickvnum",
+    "vertices_predicted",
+    "edges_predicted",
+    "facets_predicted",
+    "facetedges_predicted",
+    "bodies_predicted",
+    "quantities_predicted",
+    "method_instances_predicted",
+    "evolver_version",
+    "total_time",
+    "zoom_vertex",
+    "zoom_radius",
+    "tolerance",
+    "constraint_tolerance",
+    "target_tolerance",
+    "runge_kutta_flag",
+    "jiggle_temperature",
+    "temperature",
+    "scrollscale",
+    "linewidth",
+    "thickness",
+    "hessian_epsilon",
+    "brightness",
+    "clip_coeff",
+    "slice_coeff",
+    "merit_factor",
+    "area_weighting",
+    "pickvnum",
 ];
 
 /// Settings of a word alone, or with `on` or `off`, that change nothing here.
 const IGNORED_WORDS: [&str; 14] = [
-    "soapfilm", "keep_originals", "keep_macros", "volume_method_name", "torus_period_display", "no_dump",
-    "visibility_test", "show_trans", "sobolev", "convert_to_quantities", "everything_quantities",
-    "autodisplay", "suppress_warning", "hessian_normal",
+    "soapfilm",
+    "keep_originals",
+    "keep_macros",
+    "volume_method_name",
+    "torus_period_display",
+    "no_dump",
+    "visibility_test",
+    "show_trans",
+    "sobolev",
+    "convert_to_quantities",
+    "everything_quantities",
+    "autodisplay",
+    "suppress_warning",
+    "hessian_normal",
 ];
 
 /// What is refused, with the nearest way to do it.

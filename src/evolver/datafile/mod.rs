@@ -344,7 +344,9 @@ impl Datafile {
         }
         for instance in self.quantities.iter().flat_map(|quantity| &quantity.methods) {
             match &instance.method {
-                Method::FacetScalarIntegral(f) | Method::EdgeScalarIntegral(f) | Method::VertexScalarIntegral(f) => {
+                Method::FacetScalarIntegral(f)
+                | Method::EdgeScalarIntegral(f)
+                | Method::VertexScalarIntegral(f) => {
                     f.inputs(variables, &mut inputs);
                 }
                 Method::FacetVectorIntegral(v) | Method::EdgeVectorIntegral(v) => vectors.push(v),
@@ -397,7 +399,12 @@ struct Reader {
 }
 
 impl Reader {
-    fn compile(&self, expression: &Expression, space: Space, position: Position) -> Result<Formula, EvolverError> {
+    fn compile(
+        &self,
+        expression: &Expression,
+        space: Space,
+        position: Position,
+    ) -> Result<Formula, EvolverError> {
         let names = Names {
             variables: &self.data.variables,
             functions: &self.data.functions,
@@ -405,9 +412,14 @@ impl Reader {
             dimension: if space == Space::Parameters { 3 } else { self.data.dimension },
         };
         Formula::new(expression, &names).map_err(|mut error| {
-            let attribute = |extra: &ExtraAttribute| error.message == format!("«{}» is not defined", extra.name);
+            let attribute =
+                |extra: &ExtraAttribute| error.message == format!("«{}» is not defined", extra.name);
             if self.data.extra_attributes.iter().any(attribute) {
-                error = NoFormula { message: "an added attribute inside a formula".to_owned(), unsupported: true, ..error };
+                error = NoFormula {
+                    message: "an added attribute inside a formula".to_owned(),
+                    unsupported: true,
+                    ..error
+                };
             }
             no_formula(&self.cursor, error, position)
         })
@@ -424,7 +436,10 @@ impl Reader {
     fn number(&mut self) -> Result<f64, EvolverError> {
         let position = self.cursor.position();
         let expression = self.cursor.list_expression()?;
-        let value = self.compile(&expression, Space::Nothing, position)?.bind(&self.data.variables).value(DVec3::ZERO);
+        let value = self
+            .compile(&expression, Space::Nothing, position)?
+            .bind(&self.data.variables)
+            .value(DVec3::ZERO);
         if value.is_finite() {
             Ok(value)
         } else {

@@ -223,8 +223,20 @@ impl BinaryFunction {
                 let second = [-2.0 * qx * qy, qx * qx - qy * qy, 2.0 * qx * qy];
                 a.binary(b, x.atan2(y), [qy, -qx], second)
             }
-            Self::Minimum => if x <= y { a } else { b },
-            Self::Maximum => if x >= y { a } else { b },
+            Self::Minimum => {
+                if x <= y {
+                    a
+                } else {
+                    b
+                }
+            }
+            Self::Maximum => {
+                if x >= y {
+                    a
+                } else {
+                    b
+                }
+            }
             Self::Operator(operator) => arithmetic(operator, a, b),
         }
     }
@@ -238,12 +250,9 @@ fn arithmetic<T: Scalar>(operator: BinaryOperator, a: T, b: T) -> T {
         BinaryOperator::Add => a + b,
         BinaryOperator::Subtract => a - b,
         BinaryOperator::Multiply => a * b,
-        BinaryOperator::Divide => a.binary(
-            b,
-            x / y,
-            [1.0 / y, -x / (y * y)],
-            [0.0, -1.0 / (y * y), 2.0 * x / (y * y * y)],
-        ),
+        BinaryOperator::Divide => {
+            a.binary(b, x / y, [1.0 / y, -x / (y * y)], [0.0, -1.0 / (y * y), 2.0 * x / (y * y * y)])
+        }
         BinaryOperator::Power => power(a, b),
         // x − y·floor(x/y): the slope by y is that of the whole part.
         BinaryOperator::Modulus => {
@@ -427,7 +436,9 @@ fn compile(
         Expression::Test(_, _, position) | Expression::Aggregate(_, _, position) => {
             return fail(*position, "a query inside a formula", true);
         }
-        Expression::Text(_) => return fail(Position::default(), "a text stands where a number is needed", false),
+        Expression::Text(_) => {
+            return fail(Position::default(), "a text stands where a number is needed", false);
+        }
     }
     if out.len() > INSTRUCTIONS {
         return fail(Position::default(), "the formula grows beyond all bounds", false);
@@ -473,7 +484,8 @@ fn call(
         }
         Instruction::Binary(function)
     } else {
-        let known = ["ellipticK", "ellipticE", "incompleteEllipticF", "incompleteEllipticE", "usr1", "wrap_inverse"];
+        let known =
+            ["ellipticK", "ellipticE", "incompleteEllipticF", "incompleteEllipticE", "usr1", "wrap_inverse"];
         let unsupported = known.iter().any(|k| k.eq_ignore_ascii_case(name));
         let what = if unsupported { "the function" } else { "there is no function" };
         return fail(position, format!("{what} «{name}»"), unsupported);

@@ -4,7 +4,9 @@ use glam::{DMat3, DVec3};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// A number that formulas compute with: a plain one or a [`Jet`].
-pub trait Scalar: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> {
+pub trait Scalar:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
     /// A constant.
     fn constant(value: f64) -> Self;
     /// The value alone.

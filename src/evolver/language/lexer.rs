@@ -34,9 +34,9 @@ pub(crate) struct Token {
 
 /// All operators, the longest first.
 const SYMBOLS: [&str; 41] = [
-    "::=", ":=", "+=", "-=", "*=", "/=", "==", "!=", "<=", ">=", "&&", "||", ">>", "<<", "**", "->", "(", ")",
-    "[", "]", "{", "}", ",", ";", ":", "?", "+", "-", "*", "/", "%", "^", "=", "<", ">", "!", ".", "|", "@",
-    "#", "'",
+    "::=", ":=", "+=", "-=", "*=", "/=", "==", "!=", "<=", ">=", "&&", "||", ">>", "<<", "**", "->", "(",
+    ")", "[", "]", "{", "}", ",", ";", ":", "?", "+", "-", "*", "/", "%", "^", "=", "<", ">", "!", ".", "|",
+    "@", "#", "'",
 ];
 
 /// How deep macros may use macros, and how many tokens they may make: enough for any file written by hand.
@@ -185,8 +185,7 @@ impl<'a> Lexer<'a> {
         self.skip()?;
         let Some(c) = self.rest.chars().next() else { return Ok(false) };
         let position = self.position;
-        if c.is_ascii_digit()
-            || (c == '.' && self.rest[1..].starts_with(|next: char| next.is_ascii_digit()))
+        if c.is_ascii_digit() || (c == '.' && self.rest[1..].starts_with(|next: char| next.is_ascii_digit()))
         {
             let (kind, length) = self.number()?;
             self.advance(length);
@@ -204,7 +203,8 @@ impl<'a> Lexer<'a> {
             let symbol = if *symbol == "::=" { ":=" } else { symbol };
             self.push(TokenKind::Symbol(symbol), position);
         } else {
-            return self.fail("a word, a number or an operator", format!("the character «{}»", c.escape_debug()));
+            return self
+                .fail("a word, a number or an operator", format!("the character «{}»", c.escape_debug()));
         }
         Ok(true)
     }
@@ -214,8 +214,9 @@ impl<'a> Lexer<'a> {
         let digits = |from: usize| bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
         if bytes.len() > 2 && bytes[0] == b'0' && bytes[1] | 32 == b'x' && bytes[2].is_ascii_hexdigit() {
             let count = bytes[2..].iter().take_while(|b| b.is_ascii_hexdigit()).count();
-            let value =
-                self.rest[2..2 + count].chars().fold(0.0, |v, c| 16.0 * v + f64::from(c.to_digit(16).unwrap_or(0)));
+            let value = self.rest[2..2 + count]
+                .chars()
+                .fold(0.0, |v, c| 16.0 * v + f64::from(c.to_digit(16).unwrap_or(0)));
             return Ok((TokenKind::Number(value, true), 2 + count));
         }
         let mut end = digits(0);

@@ -10,8 +10,8 @@ use crate::{
     },
     foam::{
         complex::{
-            Complex, Element, Film, Motion, Node, NodeId, NodeImage, Region, RegionId, RegionImage, RegionKind, Shape,
-            WallId,
+            Complex, Element, Film, Motion, Node, NodeId, NodeImage, Region, RegionId, RegionImage,
+            RegionKind, Shape, WallId,
         },
         volume::{Reference, volumes},
     },
@@ -70,7 +70,11 @@ impl LevelSet for FormulaSurface {
 /// The volume of each body whose surface consists of films and of patches of constraints; `None` for a body that cannot be
 /// closed so, as where films end on a boundary.
 #[must_use]
-pub(crate) fn closed_volumes(problem: &Problem, surface: &Surface, places: &Places) -> IndexVec<BodyId, Option<f64>> {
+pub(crate) fn closed_volumes(
+    problem: &Problem,
+    surface: &Surface,
+    places: &Places,
+) -> IndexVec<BodyId, Option<f64>> {
     let none = IndexVec::from_elem(None, surface.bodies.len());
     if surface.representation != Representation::Soapfilm {
         return none;
@@ -119,7 +123,8 @@ fn complex(problem: &Problem, surface: &Surface, places: &Places) -> Option<Comp
     let period = match surface.periods {
         None => Period::NONE,
         Some(periods) => {
-            let diagonal = DMat3::from_diagonal(DVec3::new(periods.x_axis.x, periods.y_axis.y, periods.z_axis.z));
+            let diagonal =
+                DMat3::from_diagonal(DVec3::new(periods.x_axis.x, periods.y_axis.y, periods.z_axis.z));
             // The foam knows periods along the axes only.
             if periods != diagonal {
                 return None;
@@ -134,7 +139,10 @@ fn complex(problem: &Problem, surface: &Surface, places: &Places) -> Option<Comp
     let walls: IndexVec<WallId, Wall> = problem
         .walls
         .iter()
-        .map(|wall| Wall { field: Arc::new(FormulaSurface { formula: wall.formula.clone(), extent }), level: 0.0 })
+        .map(|wall| Wall {
+            field: Arc::new(FormulaSurface { formula: wall.formula.clone(), extent }),
+            level: 0.0,
+        })
         .collect();
     let nodes: IndexVec<NodeId, Node> = surface
         .vertices
@@ -180,7 +188,15 @@ fn film(surface: &Surface, id: FacetId, images: &[IVec3; 2], shape: Shape) -> Op
     let nodes = surface
         .corners(id)
         .into_iter()
-        .map(|(vertex, shift): (VertexId, IVec3)| NodeImage { node: NodeId::from_index(vertex.index()), shift })
+        .map(|(vertex, shift): (VertexId, IVec3)| NodeImage {
+            node: NodeId::from_index(vertex.index()),
+            shift,
+        })
         .collect();
-    Some(Film { back: side(0), front: side(1), tension: facet.tension, elements: vec![Element { shape, nodes }] })
+    Some(Film {
+        back: side(0),
+        front: side(1),
+        tension: facet.tension,
+        elements: vec![Element { shape, nodes }],
+    })
 }

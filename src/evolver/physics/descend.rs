@@ -93,8 +93,7 @@ impl Restoring {
             let raw: Vec<(FunctionalId, DVec3)> = slots.at(vertex).collect();
             for (i, (a, gradient)) in raw.iter().enumerate() {
                 // On a boundary both must be velocities of parameters.
-                let gradient =
-                    if problem.moves_on_boundary(vertex) { own[i].1 } else { *gradient };
+                let gradient = if problem.moves_on_boundary(vertex) { own[i].1 } else { *gradient };
                 for (b, velocity) in &own {
                     if let (Some(r), Some(c)) = (row[*a], row[*b])
                         && r >= c
@@ -118,7 +117,8 @@ impl Restoring {
         // A volume that nothing can change, or that follows from others, must not make the matrix singular.
         let most = sparse.iter().filter(|((r, c), _)| r == c).fold(0.0, |most: f64, (_, v)| most.max(*v));
         for at in 0..size {
-            *sparse.entry((checked_u32(at), checked_u32(at))).or_insert(0.0) += STIFFENING * most.max(f64::MIN_POSITIVE);
+            *sparse.entry((checked_u32(at), checked_u32(at))).or_insert(0.0) +=
+                STIFFENING * most.max(f64::MIN_POSITIVE);
         }
         let (entries, values) = sparse.into_iter().unzip();
         Self { velocities, held, row, entries, values }
@@ -350,7 +350,7 @@ impl Trial<'_> {
         let e_zero = self.energy(0.0)?;
         let (mut second, mut e_second) = (first, e_first);
         if e_first < e_zero {
-            while scale < limit {
+            loop {
                 scale *= 2.0;
                 (second, e_second) = (scale, self.energy(scale)?);
                 if e_second > e_first {
@@ -358,6 +358,9 @@ impl Trial<'_> {
                     break;
                 }
                 (first, e_first) = (second, e_second);
+                if scale >= limit {
+                    break;
+                }
             }
         } else {
             let mut tries = 0;
@@ -371,7 +374,7 @@ impl Trial<'_> {
                 (first, e_first) = (scale, self.energy(scale)?);
             }
         }
-        if scale < limit {
+        if scale <= limit {
             let denominator = e_zero * (first - second) + e_first * second - e_second * first;
             let numerator = (e_zero - e_second) * first * first + (e_first - e_zero) * second * second;
             let parabola = 0.5 * numerator / denominator;

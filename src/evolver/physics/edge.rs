@@ -162,8 +162,8 @@ pub(super) fn add_gap_hessian(factor: f64, wall: &Bound, nodes: &[DVec3], hessia
                 gradient
             };
             let (up, down) = (moved(1.0), moved(-1.0));
-            for row in 0..2 {
-                blocks[row][axis] = (up[row] - down[row]) / (2.0 * step);
+            for (block, (up, down)) in blocks.iter_mut().zip(up.into_iter().zip(down)) {
+                block[axis] = (up - down) / (2.0 * step);
             }
         }
         for (row, columns) in blocks.iter().enumerate() {

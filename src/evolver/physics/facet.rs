@@ -107,7 +107,9 @@ impl FacetField {
             let weight = factor * point.weight;
             for (i, out) in gradient.iter_mut().enumerate().take(count) {
                 *out += weight
-                    * (point.value[i] * parts.first[0] + point.du[i] * parts.first[1] + point.dv[i] * parts.first[2]);
+                    * (point.value[i] * parts.first[0]
+                        + point.du[i] * parts.first[1]
+                        + point.dv[i] * parts.first[2]);
             }
             if let (Some(hessian), Some(second)) = (hessian.as_deref_mut(), &parts.second) {
                 scatter(point, weight, count, second, hessian);

@@ -1,6 +1,9 @@
 //! How vertices may move: on constraints, on boundaries, fixed; and the normals along which Newton steps move them.
 
-use super::{Places, problem::{Problem, Wall}};
+use super::{
+    Places,
+    problem::{Problem, Wall},
+};
 use crate::{
     evolver::{
         datafile::{Representation, Side},
@@ -120,7 +123,9 @@ impl Problem {
 
     /// The place on a boundary.
     pub(crate) fn boundary_place(&self, boundary: BoundaryId, [p, q]: [f64; 2]) -> DVec3 {
-        DVec3::from_array(self.boundaries[boundary].each_ref().map(|bound| bound.value(DVec3::new(p, q, 0.0))))
+        DVec3::from_array(
+            self.boundaries[boundary].each_ref().map(|bound| bound.value(DVec3::new(p, q, 0.0))),
+        )
     }
 
     /// Moves one vertex by `scale` times its velocity (see [`Problem::projected`]), without the return to constraints.
@@ -226,7 +231,8 @@ impl Problem {
                 let p = state.places[vertex];
                 let jets: Vec<_> =
                     active(self, constraints, state.hits[vertex]).map(|wall| wall.formula.jet(p)).collect();
-                let rows: Vec<(DVec3, f64)> = jets.iter().map(|jet| (jet.gradient, jet.gradient.dot(force))).collect();
+                let rows: Vec<(DVec3, f64)> =
+                    jets.iter().map(|jet| (jet.gradient, jet.gradient.dot(force))).collect();
                 for (jet, lambda) in jets.iter().zip(multipliers(&rows)) {
                     for (i, &a) in basis.iter().enumerate() {
                         for (j, &b) in basis.iter().enumerate() {
@@ -237,10 +243,12 @@ impl Problem {
             }
             Hold::Boundary(boundary) => {
                 let [p, q] = state.parameters[vertex];
-                let jets = self.boundaries[*boundary].each_ref().map(|bound| bound.jet(DVec3::new(p, q, 0.0)));
+                let jets =
+                    self.boundaries[*boundary].each_ref().map(|bound| bound.jet(DVec3::new(p, q, 0.0)));
                 for i in 0..basis.len().min(2) {
                     for j in 0..basis.len().min(2) {
-                        block.col_mut(j)[i] += (0..3).map(|axis| force[axis] * jets[axis].hessian.col(j)[i]).sum::<f64>();
+                        block.col_mut(j)[i] +=
+                            (0..3).map(|axis| force[axis] * jets[axis].hessian.col(j)[i]).sum::<f64>();
                     }
                 }
             }
@@ -250,7 +258,13 @@ impl Problem {
 
     /// The directions in which a vertex may move, orthonormal, within the span of `normals` where they are given; on a
     /// boundary the derivatives by its parameters.
-    pub(super) fn directions(&self, state: &State, vertex: VertexId, normals: Option<&[DVec3]>, plane: bool) -> Vec<DVec3> {
+    pub(super) fn directions(
+        &self,
+        state: &State,
+        vertex: VertexId,
+        normals: Option<&[DVec3]>,
+        plane: bool,
+    ) -> Vec<DVec3> {
         match &self.holds[vertex] {
             Hold::Fixed => Vec::new(),
             Hold::Boundary(boundary) => {
@@ -259,8 +273,9 @@ impl Problem {
             }
             Hold::On(constraints) => {
                 let p = state.places[vertex];
-                let mut held =
-                    orthonormal(active(self, constraints, state.hits[vertex]).map(|wall| wall.formula.jet(p).gradient));
+                let mut held = orthonormal(
+                    active(self, constraints, state.hits[vertex]).map(|wall| wall.formula.jet(p).gradient),
+                );
                 if plane {
                     held = orthonormal([DVec3::Z].into_iter().chain(held));
                 }
@@ -289,14 +304,15 @@ fn least_motion(rows: &[(DVec3, f64)]) -> DVec3 {
 }
 
 /// Factors `c` with `Σ cⱼ gⱼ·gᵢ = vᵢ`, by Gauss elimination of up to three rows; zero where rows depend on each other.
+#[allow(clippy::needless_range_loop, reason = "elimination goes by rows and columns")]
 fn multipliers(rows: &[(DVec3, f64)]) -> Vec<f64> {
     let n = rows.len().min(3);
     let mut matrix = [[0.0; 4]; 3];
-    for i in 0..n {
-        for j in 0..n {
-            matrix[i][j] = rows[i].0.dot(rows[j].0);
+    for (row, (gradient, value)) in matrix.iter_mut().zip(&rows[..n]) {
+        for (entry, (other, _)) in row.iter_mut().zip(&rows[..n]) {
+            *entry = gradient.dot(*other);
         }
-        matrix[i][3] = rows[i].1;
+        row[3] = *value;
     }
     let mut dropped = [false; 3];
     for pivot in 0..n {
@@ -314,9 +330,7 @@ fn multipliers(rows: &[(DVec3, f64)]) -> Vec<f64> {
             }
         }
     }
-    (0..rows.len())
-        .map(|i| if i < n && !dropped[i] { matrix[i][3] / matrix[i][i] } else { 0.0 })
-        .collect()
+    (0..rows.len()).map(|i| if i < n && !dropped[i] { matrix[i][3] / matrix[i][i] } else { 0.0 }).collect()
 }
 
 /// The normals of a surface at each vertex: one within a film, two where three films meet along a line, none (all directions)
@@ -362,15 +376,21 @@ fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId
             let Some(&first) = facets.first() else { return None };
             // Neighbouring facets may be turned round: all are counted to the side of the first.
             let start = areas[first];
-            let sum: DVec3 =
-                facets.iter().map(|&facet| if areas[facet].dot(start) < 0.0 { -areas[facet] } else { areas[facet] }).sum();
+            let sum: DVec3 = facets
+                .iter()
+                .map(|&facet| if areas[facet].dot(start) < 0.0 { -areas[facet] } else { areas[facet] })
+                .sum();
             (sum.length() > 0.0).then(|| vec![sum.normalize()])
         })
         .collect()
 }
 
 /// The two directions across the line that a vertex lies on.
-fn line_normals(surface: &Surface, vertex: VertexId, lines: &[crate::evolver::surface::EdgeId]) -> Vec<DVec3> {
+fn line_normals(
+    surface: &Surface,
+    vertex: VertexId,
+    lines: &[crate::evolver::surface::EdgeId],
+) -> Vec<DVec3> {
     let outward = |edge: crate::evolver::surface::EdgeId| {
         let reversed = surface.edges[edge].ends[0] != vertex;
         surface.side(Directed { edge, reversed })
@@ -397,9 +417,8 @@ fn string_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<Vertex
     }
     for vertex in surface.vertices.ids() {
         if let [a, b] = neighbours.edges[vertex][..] {
-            let outward = |edge| {
-                surface.side(Directed { edge, reversed: surface.edges[edge].ends[0] != vertex })
-            };
+            let outward =
+                |edge| surface.side(Directed { edge, reversed: surface.edges[edge].ends[0] != vertex });
             tangents[vertex] = Some(outward(a) - outward(b));
         }
     }

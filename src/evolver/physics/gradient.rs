@@ -318,6 +318,11 @@ impl Local {
     fn new(nodes: &[u32]) -> Self {
         let mut all = [0; 6];
         all[..nodes.len()].copy_from_slice(nodes);
-        Self { nodes: all, count: nodes.len(), gradient: [DVec3::ZERO; 6], hessian: Blocks::zero(nodes.len()) }
+        Self {
+            nodes: all,
+            count: nodes.len(),
+            gradient: [DVec3::ZERO; 6],
+            hessian: Blocks::zero(nodes.len()),
+        }
     }
 }

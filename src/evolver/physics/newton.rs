@@ -87,8 +87,11 @@ impl Newton {
             .ids()
             .map(|vertex| {
                 let along = along.as_ref().and_then(|along| along[vertex].as_deref());
-                let own =
-                    if used[vertex.index()] { problem.directions(state, vertex, along, plane) } else { Vec::new() };
+                let own = if used[vertex.index()] {
+                    problem.directions(state, vertex, along, plane)
+                } else {
+                    Vec::new()
+                };
                 let mut basis = [DVec3::ZERO; 3];
                 basis[..own.len()].copy_from_slice(&own);
                 freedoms += own.len();
@@ -155,7 +158,8 @@ impl Newton {
         if b > a || (twice && j > i) {
             return;
         }
-        let (of_a, of_b) = (self.directions[VertexId::from_index(a)], self.directions[VertexId::from_index(b)]);
+        let (of_a, of_b) =
+            (self.directions[VertexId::from_index(a)], self.directions[VertexId::from_index(b)]);
         let hessian = local.hessian.as_mat();
         let block = DMat3::from_cols_array_2d(&std::array::from_fn(|c| {
             std::array::from_fn(|r| hessian[(3 * i + r, 3 * j + c)])
@@ -255,8 +259,9 @@ impl Newton {
         let factor = self.factor(shift)?;
         let plain = self.factor(0.0)?;
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let mut basis: Vec<Vec<f64>> =
-            (0..width).map(|_| (0..self.freedoms).map(|_| random.random_range(-1.0..1.0)).collect()).collect();
+        let mut basis: Vec<Vec<f64>> = (0..width)
+            .map(|_| (0..self.freedoms).map(|_| random.random_range(-1.0..1.0)).collect())
+            .collect();
         let mut found = vec![0.0; width];
         for _ in 0..ITERATIONS {
             for vector in &mut basis {
@@ -268,7 +273,8 @@ impl Newton {
             orthonormalise(&mut basis);
             let before = found.clone();
             found = self.rotate(&plain, &mut basis)?;
-            let change = found.iter().zip(&before).take(count).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let change =
+                found.iter().zip(&before).take(count).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             let size = found.iter().take(count).fold(0.0, |most: f64, x| most.max(x.abs()));
             if change <= 1e-12 * size {
                 break;
@@ -288,7 +294,11 @@ impl Newton {
     }
 
     /// Rotates an orthonormal basis to the eigenvectors of the Hessian within it.
-    fn rotate(&self, plain: &SymmetricFactor<'_>, basis: &mut Vec<Vec<f64>>) -> Result<Vec<f64>, EvolverError> {
+    fn rotate(
+        &self,
+        plain: &SymmetricFactor<'_>,
+        basis: &mut Vec<Vec<f64>>,
+    ) -> Result<Vec<f64>, EvolverError> {
         let size = basis.len();
         let images: Vec<Vec<f64>> = basis
             .iter()
@@ -381,7 +391,10 @@ impl Problem {
     }
 
     /// The multipliers that leave the least force, by the gradients alone.
-    pub(crate) fn estimated_multipliers(&self, state: &State) -> Result<IndexVec<FunctionalId, f64>, EvolverError> {
+    pub(crate) fn estimated_multipliers(
+        &self,
+        state: &State,
+    ) -> Result<IndexVec<FunctionalId, f64>, EvolverError> {
         let gradients = self.gradients(&state.places, self.slots());
         let restoring = Restoring::new(self, state, &gradients.functionals);
         Ok(self.force(state, &gradients, &restoring)?.1)

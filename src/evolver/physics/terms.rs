@@ -5,9 +5,7 @@ use super::{
     facet::FacetField,
     field::VectorField,
     freedom::Hold,
-    problem::{
-        Destination, EdgePart, Functional, FunctionalId, Measured, Part, Point, Problem, Term, Wall,
-    },
+    problem::{Destination, EdgePart, Functional, FunctionalId, Measured, Part, Point, Problem, Term, Wall},
 };
 use crate::{
     evolver::{
@@ -55,7 +53,11 @@ struct Collector<'a> {
 
 impl Problem {
     /// All terms of `surface`.
-    pub(crate) fn new(data: &Datafile, surface: &Surface, conditions: &Conditions<'_>) -> Result<Self, EvolverError> {
+    pub(crate) fn new(
+        data: &Datafile,
+        surface: &Surface,
+        conditions: &Conditions<'_>,
+    ) -> Result<Self, EvolverError> {
         let neighbours = Neighbours::new(surface);
         let images = body_images(surface, &neighbours)?;
         let bind = |formula: &crate::evolver::language::formula::Formula| formula.bind(conditions.variables);
@@ -68,7 +70,11 @@ impl Problem {
             edge_parts: Vec::new(),
             edge_fields: Vec::new(),
             points: Vec::new(),
-            walls: data.constraints.iter().map(|c| Wall { formula: bind(&c.formula), side: c.side }).collect(),
+            walls: data
+                .constraints
+                .iter()
+                .map(|c| Wall { formula: bind(&c.formula), side: c.side })
+                .collect(),
             boundaries: data
                 .boundaries
                 .iter()
@@ -133,7 +139,8 @@ impl Collector<'_> {
             });
         }
         self.first_quantity = self.problem.functionals.len();
-        for (at, (quantity, state)) in self.data.quantities.iter().zip(self.conditions.quantities).enumerate() {
+        for (at, (quantity, state)) in self.data.quantities.iter().zip(self.conditions.quantities).enumerate()
+        {
             self.problem.functionals.push(Functional {
                 measured: Measured::Quantity(at),
                 name: quantity.name.clone(),
@@ -177,7 +184,12 @@ impl Collector<'_> {
                 }
                 let heavy = sign * self.surface.bodies[body].density * self.conditions.gravity;
                 if heavy.abs() > 0.0 {
-                    parts.push(Part { field: weight, destination: Destination::Energy, weight: heavy, offset });
+                    parts.push(Part {
+                        field: weight,
+                        destination: Destination::Energy,
+                        weight: heavy,
+                        offset,
+                    });
                 }
             }
         }
@@ -185,7 +197,8 @@ impl Collector<'_> {
 
     /// Areas and weights of the cells of a foam in the plane.
     fn string_bodies(&mut self) {
-        let field = if self.data.symmetric_content { VectorField::PlaneCone } else { VectorField::PlaneHeight };
+        let field =
+            if self.data.symmetric_content { VectorField::PlaneCone } else { VectorField::PlaneHeight };
         let area = self.edge_field(EdgePart::Field(EdgeField::Along(field)));
         let weight = self.edge_field(EdgePart::Field(EdgeField::Along(VectorField::PlaneHalfSquare)));
         for (id, facet) in self.surface.facets.enumerated() {
@@ -240,7 +253,8 @@ impl Collector<'_> {
                 let field = EdgePart::Field(EdgeField::Along(self.vector(energy)));
                 let field = self.edge_field(field);
                 for (id, _) in self.surface.edges.enumerated().filter(|(_, edge)| on(&edge.common)) {
-                    let part = Part { field, destination: Destination::Energy, weight: 1.0, offset: DVec3::ZERO };
+                    let part =
+                        Part { field, destination: Destination::Energy, weight: 1.0, offset: DVec3::ZERO };
                     self.edge_parts[id.index()].push(part);
                 }
             }
@@ -340,7 +354,12 @@ impl Collector<'_> {
         }
     }
 
-    fn method(&mut self, at: usize, quantity: &Quantity, instance: &crate::evolver::datafile::MethodInstance) {
+    fn method(
+        &mut self,
+        at: usize,
+        quantity: &Quantity,
+        instance: &crate::evolver::datafile::MethodInstance,
+    ) {
         let destination = Destination::Functional(FunctionalId::from_index(self.first_quantity + at));
         let of = |common: &Common| instance.global || common.quantities.contains(&checked_u32(at));
         let modulus = instance.modulus;
@@ -348,15 +367,24 @@ impl Collector<'_> {
         let (facet, edge): (Option<FacetField>, Option<EdgeField>) = match &instance.method {
             Method::FacetArea | Method::FacetTension => (Some(FacetField::Area), None),
             Method::FacetVolume => (Some(FacetField::Flux(VectorField::Height)), None),
-            Method::FacetScalarIntegral(f) => (Some(FacetField::Scalar(f.bind(self.conditions.variables))), None),
+            Method::FacetScalarIntegral(f) => {
+                (Some(FacetField::Scalar(f.bind(self.conditions.variables))), None)
+            }
             Method::FacetVectorIntegral(f) => (Some(FacetField::Flux(self.vector(f))), None),
             Method::EdgeLength | Method::EdgeTension => (None, Some(EdgeField::Length)),
-            Method::EdgeScalarIntegral(f) => (None, Some(EdgeField::Scalar(f.bind(self.conditions.variables)))),
+            Method::EdgeScalarIntegral(f) => {
+                (None, Some(EdgeField::Scalar(f.bind(self.conditions.variables))))
+            }
             Method::EdgeVectorIntegral(f) => (None, Some(EdgeField::Along(self.vector(f)))),
             Method::VertexScalarIntegral(f) => {
                 let field = f.bind(self.conditions.variables);
                 for (vertex, _) in self.surface.vertices.enumerated().filter(|(_, v)| of(&v.common)) {
-                    self.problem.points.push(Point { vertex, field: field.clone(), destination, weight: modulus });
+                    self.problem.points.push(Point {
+                        vertex,
+                        field: field.clone(),
+                        destination,
+                        weight: modulus,
+                    });
                 }
                 return;
             }
@@ -393,7 +421,10 @@ impl Collector<'_> {
             if edge.tension.abs() <= 0.0 && parts.is_empty() {
                 continue;
             }
-            let mut nodes = vec![(edge.ends[0], IVec3::ZERO), (edge.ends[1], surface.wrap(Directed { edge: element, reversed: false }))];
+            let mut nodes = vec![
+                (edge.ends[0], IVec3::ZERO),
+                (edge.ends[1], surface.wrap(Directed { edge: element, reversed: false })),
+            ];
             if let Some(middle) = edge.middle {
                 nodes.insert(1, (middle, IVec3::ZERO));
             }

@@ -130,13 +130,20 @@ impl Session {
         Ok(match name {
             "p1" => Some(vertex.parameters[0]),
             "p2" => Some(vertex.parameters[1]),
-            "valence" => Some(number(self.parts(Element { kind: ElementKind::Vertex, index: id.index() }, ElementKind::Edge).len())),
+            "valence" => Some(number(
+                self.parts(Element { kind: ElementKind::Vertex, index: id.index() }, ElementKind::Edge).len(),
+            )),
             "midv" => Some(truth(vertex.middle)),
             _ => None,
         })
     }
 
-    fn edge_attribute(&mut self, id: EdgeId, name: &str, index: Option<f64>) -> Result<Option<f64>, EvolverError> {
+    fn edge_attribute(
+        &mut self,
+        id: EdgeId,
+        name: &str,
+        index: Option<f64>,
+    ) -> Result<Option<f64>, EvolverError> {
         let side = self.surface.side(Directed { edge: id, reversed: false });
         if let Some(value) = component(side, name, index) {
             return Ok(Some(value));
@@ -157,14 +164,20 @@ impl Session {
     fn dihedral(&mut self, id: EdgeId) -> f64 {
         let [f, g] = self.around(id)[..] else { return 0.0 };
         let (f, g) = (FacetId::from_index(f), FacetId::from_index(g));
-        let sense = |facet: FacetId| self.surface.facets[facet].edges.iter().any(|d| d.edge == id && d.reversed);
+        let sense =
+            |facet: FacetId| self.surface.facets[facet].edges.iter().any(|d| d.edge == id && d.reversed);
         let turned = sense(f) == sense(g);
         let (a, b) = (self.surface.area_vector(f), self.surface.area_vector(g));
         let b = if turned { -b } else { b };
         a.cross(b).length().atan2(a.dot(b))
     }
 
-    fn facet_attribute(&mut self, id: FacetId, name: &str, index: Option<f64>) -> Result<Option<f64>, EvolverError> {
+    fn facet_attribute(
+        &mut self,
+        id: FacetId,
+        name: &str,
+        index: Option<f64>,
+    ) -> Result<Option<f64>, EvolverError> {
         if matches!(name, "x" | "y" | "z" | "x1" | "x2" | "x3") {
             return Ok(component(self.surface.area_vector(id), name, index));
         }
@@ -188,20 +201,30 @@ impl Session {
             "pressure" => Some(self.pressure(id)),
             "volume" => Some(self.values()?.functionals[FunctionalId::from_index(id.index())]),
             "fixedvol" => Some(truth(body.target.is_some())),
-            "valence" => Some(number(self.parts(Element { kind: ElementKind::Body, index: id.index() }, ElementKind::Facet).len())),
+            "valence" => Some(number(
+                self.parts(Element { kind: ElementKind::Body, index: id.index() }, ElementKind::Facet).len(),
+            )),
             _ => None,
         })
     }
 
     /// A number of a named quantity.
-    pub(super) fn quantity_member(&mut self, quantity: &str, name: &str) -> Result<Option<f64>, EvolverError> {
-        let Some(at) = self.data.quantities.iter().position(|q| *q.name == *quantity) else { return Ok(None) };
+    pub(super) fn quantity_member(
+        &mut self,
+        quantity: &str,
+        name: &str,
+    ) -> Result<Option<f64>, EvolverError> {
+        let Some(at) = self.data.quantities.iter().position(|q| *q.name == *quantity) else {
+            return Ok(None);
+        };
         let id = FunctionalId::from_index(self.surface.bodies.len() + at);
         Ok(match name {
             "value" => Some(self.values()?.functionals[id]),
             "modulus" => Some(self.quantities[at].modulus),
             "pressure" => Some(self.multipliers[id]),
-            "target" => Some(if let Purpose::Fixed(target) = self.quantities[at].purpose { target } else { 0.0 }),
+            "target" => {
+                Some(if let Purpose::Fixed(target) = self.quantities[at].purpose { target } else { 0.0 })
+            }
             _ => None,
         })
     }
@@ -242,7 +265,11 @@ impl Session {
     pub(super) fn parts(&mut self, owner: Element, kind: ElementKind) -> Vec<usize> {
         let mut out: Vec<usize> = match (owner.kind, kind) {
             (ElementKind::Edge, ElementKind::Vertex) => {
-                return self.surface.edges[EdgeId::from_index(owner.index)].ends.iter().map(|v| v.index()).collect();
+                return self.surface.edges[EdgeId::from_index(owner.index)]
+                    .ends
+                    .iter()
+                    .map(|v| v.index())
+                    .collect();
             }
             (ElementKind::Facet, ElementKind::Edge) => {
                 let facet = &self.surface.facets[FacetId::from_index(owner.index)];
@@ -286,7 +313,9 @@ impl Session {
                 let element = |index| Element { kind: ElementKind::Edge, index };
                 edges.into_iter().flat_map(|e| self.parts(element(e), ElementKind::Vertex)).collect()
             }
-            (ElementKind::Edge, ElementKind::Edge) | (ElementKind::Facet, ElementKind::Facet) => vec![owner.index],
+            (ElementKind::Edge, ElementKind::Edge) | (ElementKind::Facet, ElementKind::Facet) => {
+                vec![owner.index]
+            }
         };
         out.sort_unstable();
         out.dedup();

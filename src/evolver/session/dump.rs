@@ -41,7 +41,9 @@ impl Session {
             // Writing to a string does not fail.
             let _ = writeln!(text, "{}", self.element_line(Element { kind: ElementKind::Vertex, index }));
         }
-        for (title, kind) in [("edges", ElementKind::Edge), ("faces", ElementKind::Facet), ("bodies", ElementKind::Body)] {
+        for (title, kind) in
+            [("edges", ElementKind::Edge), ("faces", ElementKind::Facet), ("bodies", ElementKind::Body)]
+        {
             if self.count(kind) == 0 {
                 continue;
             }
@@ -65,8 +67,10 @@ impl Session {
         for line in source[..end].lines() {
             let word = line.split_whitespace().next().unwrap_or_default().to_lowercase();
             let word = word.trim_end_matches(':');
-            let dropped = matches!(word, "linear" | "quadratic" | "scale" | "total_time" | "gravity_constant" | "gravity")
-                || word.ends_with("_predicted")
+            let dropped = matches!(
+                word,
+                "linear" | "quadratic" | "scale" | "total_time" | "gravity_constant" | "gravity"
+            ) || word.ends_with("_predicted")
                 || line.starts_with("// Written by combwright")
                 || line.starts_with("// Total energy:");
             if dropped {
@@ -102,7 +106,8 @@ impl Session {
         let source = &self.data.source.text;
         let text = self.data.read_at.map_or("", |position| &source[offset(source, position)..]);
         let body = text.trim_start();
-        let body = if body.get(..4).is_some_and(|word| word.eq_ignore_ascii_case("read")) { &body[4..] } else { "" };
+        let body =
+            if body.get(..4).is_some_and(|word| word.eq_ignore_ascii_case("read")) { &body[4..] } else { "" };
         let mut out = body.trim_start_matches([' ', '\t', '\r', '\n']).trim_end().to_owned();
         if !out.is_empty() {
             out.push('\n');
@@ -153,9 +158,8 @@ impl Session {
     fn extra_text(&self, extra: &[f64], kind: ElementKind, out: &mut String) {
         let mut at = 0;
         for attribute in self.surface.attributes.iter().filter(|attribute| attribute.kind == kind) {
-            let values: Vec<String> = (0..attribute.length)
-                .map(|i| exact(extra.get(at + i).copied().unwrap_or(0.0)))
-                .collect();
+            let values: Vec<String> =
+                (0..attribute.length).map(|i| exact(extra.get(at + i).copied().unwrap_or(0.0))).collect();
             at += attribute.length;
             let _ = write!(out, "  {} {}", attribute.name, values.join(" "));
         }
@@ -183,7 +187,8 @@ impl Session {
             n if n > 0 => "+",
             _ => "-",
         };
-        let symbols: Vec<&str> = wrap.to_array()[..self.surface.dimension].iter().map(|&n| symbol(n)).collect();
+        let symbols: Vec<&str> =
+            wrap.to_array()[..self.surface.dimension].iter().map(|&n| symbol(n)).collect();
         format!("  {}", symbols.join(" "))
     }
 

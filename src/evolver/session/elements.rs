@@ -20,7 +20,9 @@ use std::fmt::Write as _;
 impl Session {
     pub(super) fn common_mut(&mut self, element: Element) -> Option<&mut Common> {
         match element.kind {
-            ElementKind::Vertex => Some(&mut self.surface.vertices[VertexId::from_index(element.index)].common),
+            ElementKind::Vertex => {
+                Some(&mut self.surface.vertices[VertexId::from_index(element.index)].common)
+            }
             ElementKind::Edge => Some(&mut self.surface.edges[EdgeId::from_index(element.index)].common),
             ElementKind::Facet => Some(&mut self.surface.facets[FacetId::from_index(element.index)].common),
             ElementKind::Body => None,
@@ -30,7 +32,9 @@ impl Session {
     pub(super) fn set_extra(&mut self, element: Element, place: usize, value: f64) {
         let extra = match element.kind {
             ElementKind::Body => &mut self.surface.bodies[BodyId::from_index(element.index)].extra,
-            ElementKind::Vertex => &mut self.surface.vertices[VertexId::from_index(element.index)].common.extra,
+            ElementKind::Vertex => {
+                &mut self.surface.vertices[VertexId::from_index(element.index)].common.extra
+            }
             ElementKind::Edge => &mut self.surface.edges[EdgeId::from_index(element.index)].common.extra,
             ElementKind::Facet => &mut self.surface.facets[FacetId::from_index(element.index)].common.extra,
         };
@@ -68,12 +72,14 @@ impl Session {
                 elements.len()
             }
             (ElementCommand::Refine, Some(ElementKind::Edge)) => {
-                let edges: Vec<EdgeId> = elements.iter().map(|element| EdgeId::from_index(element.index)).collect();
+                let edges: Vec<EdgeId> =
+                    elements.iter().map(|element| EdgeId::from_index(element.index)).collect();
                 self.refine_edges(&edges);
                 edges.len()
             }
             (ElementCommand::Refine, Some(ElementKind::Facet)) if self.has_films() => {
-                let facets: Vec<FacetId> = elements.iter().map(|element| FacetId::from_index(element.index)).collect();
+                let facets: Vec<FacetId> =
+                    elements.iter().map(|element| FacetId::from_index(element.index)).collect();
                 facets.iter().for_each(|&facet| self.surface.star(facet));
                 facets.len()
             }
@@ -88,10 +94,14 @@ impl Session {
                     ElementCommand::Equiangulate => surface.equiangulate_edge(edge, around),
                     _ => surface.swap(edge, around),
                 };
-                elements.iter().filter(|e| swap(&mut self.surface, EdgeId::from_index(e.index), &mut around)).count()
+                elements
+                    .iter()
+                    .filter(|e| swap(&mut self.surface, EdgeId::from_index(e.index), &mut around))
+                    .count()
             }
             (ElementCommand::Delete, Some(ElementKind::Edge)) => {
-                let edges: Vec<EdgeId> = elements.iter().map(|element| EdgeId::from_index(element.index)).collect();
+                let edges: Vec<EdgeId> =
+                    elements.iter().map(|element| EdgeId::from_index(element.index)).collect();
                 self.delete_edges(&edges)
             }
             (command, Some(kind)) => {
@@ -165,9 +175,9 @@ impl Session {
         for element in &elements {
             scope.push(query.name.clone(), *element);
             let one = match (name, value) {
-                ("constraint" | "boundary", Some(label)) => {
-                    self.label(label, scope).and_then(|label| self.attach(*element, name, &label, position, scope))
-                }
+                ("constraint" | "boundary", Some(label)) => self
+                    .label(label, scope)
+                    .and_then(|label| self.attach(*element, name, &label, position, scope)),
                 (_, Some(value)) => self.evaluate(value, scope).map(|value| values.push((*element, value))),
                 (_, None) => {
                     values.push((*element, 1.0));

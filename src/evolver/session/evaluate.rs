@@ -59,7 +59,12 @@ impl Scope {
         self.entries.pop();
     }
 
-    pub(super) fn unsupported<T>(&self, position: Position, what: &str, hint: &str) -> Result<T, EvolverError> {
+    pub(super) fn unsupported<T>(
+        &self,
+        position: Position,
+        what: &str,
+        hint: &str,
+    ) -> Result<T, EvolverError> {
         match &self.source {
             Some(source) => {
                 let place = Place { source: source.clone(), position };
@@ -121,7 +126,9 @@ impl Session {
                 let label = self.label(operand, scope)?;
                 self.element_test(*test, element, &label, *position, scope)
             }
-            Expression::Aggregate(aggregate, parts, _) => self.aggregate(*aggregate, &parts.0, &parts.1, scope),
+            Expression::Aggregate(aggregate, parts, _) => {
+                self.aggregate(*aggregate, &parts.0, &parts.1, scope)
+            }
         }
     }
 
@@ -166,7 +173,8 @@ impl Session {
             return Ok(function.apply(*a, *b));
         }
         let Some(function) = self.data.functions.get(name).cloned() else {
-            return scope.fail(position, format!("there is no function «{name}» of {} arguments", values.len()));
+            return scope
+                .fail(position, format!("there is no function «{name}» of {} arguments", values.len()));
         };
         if function.arguments.len() != values.len() {
             let message =
@@ -178,7 +186,13 @@ impl Session {
         self.evaluate(&body, scope)
     }
 
-    fn index(&mut self, base: &Expression, index: &Expression, position: Position, scope: &mut Scope) -> Value {
+    fn index(
+        &mut self,
+        base: &Expression,
+        index: &Expression,
+        position: Position,
+        scope: &mut Scope,
+    ) -> Value {
         let at = self.evaluate(index, scope)?;
         match base {
             Expression::Name(name, _) => {
@@ -216,7 +230,11 @@ impl Session {
     }
 
     /// The element that an expression stands for.
-    pub(super) fn element(&mut self, expression: &Expression, scope: &mut Scope) -> Result<Element, EvolverError> {
+    pub(super) fn element(
+        &mut self,
+        expression: &Expression,
+        scope: &mut Scope,
+    ) -> Result<Element, EvolverError> {
         match expression {
             Expression::Name(name, position) => match scope.named(name) {
                 Some(element) => Ok(element),
@@ -267,8 +285,11 @@ impl Session {
         match whole(number).and_then(|n| n.checked_sub(1)).and_then(|n| parts.get(n)) {
             Some(&index) => Ok(Element { kind, index }),
             None => {
-                let message =
-                    format!("a {} has {} of these parts, not a number {number}", owner.kind.name(), parts.len());
+                let message = format!(
+                    "a {} has {} of these parts, not a number {number}",
+                    owner.kind.name(),
+                    parts.len()
+                );
                 scope.fail(position, message)
             }
         }
@@ -318,7 +339,13 @@ impl Session {
         Ok(found)
     }
 
-    fn aggregate(&mut self, aggregate: Aggregate, query: &Query, value: &Expression, scope: &mut Scope) -> Value {
+    fn aggregate(
+        &mut self,
+        aggregate: Aggregate,
+        query: &Query,
+        value: &Expression,
+        scope: &mut Scope,
+    ) -> Value {
         let mut values = Vec::new();
         for element in self.found(query, scope)? {
             scope.push(query.name.clone(), element);
@@ -384,7 +411,9 @@ fn substituted(body: &Expression, names: &[Arc<str>], values: &[f64]) -> Express
             None => body.clone(),
         },
         Expression::Unary(operator, inner) => Expression::Unary(*operator, Box::new(go(inner))),
-        Expression::Binary(operator, parts) => Expression::Binary(*operator, Box::new([go(&parts[0]), go(&parts[1])])),
+        Expression::Binary(operator, parts) => {
+            Expression::Binary(*operator, Box::new([go(&parts[0]), go(&parts[1])]))
+        }
         Expression::Conditional(parts) => {
             Expression::Conditional(Box::new([go(&parts[0]), go(&parts[1]), go(&parts[2])]))
         }

@@ -117,7 +117,9 @@ impl Session {
                     Ok(Flow::Next)
                 }
             }
-            Action::While(..) | Action::DoWhile(..) | Action::For(..) => self.repeat(&statement.action, scope, host),
+            Action::While(..) | Action::DoWhile(..) | Action::For(..) => {
+                self.repeat(&statement.action, scope, host)
+            }
             Action::Foreach(query, body) => self.foreach(query, body, scope, host),
             Action::Redirect(body, name, append) => self.redirect(body, name, *append, scope, host),
             Action::Call(name) => self.call_procedure(name, statement.position, scope, host),
@@ -189,7 +191,13 @@ impl Session {
         Ok(flow)
     }
 
-    fn call_procedure(&mut self, name: &Arc<str>, position: Position, scope: &mut Scope, host: &mut dyn Host) -> Ran {
+    fn call_procedure(
+        &mut self,
+        name: &Arc<str>,
+        position: Position,
+        scope: &mut Scope,
+        host: &mut dyn Host,
+    ) -> Ran {
         if let Some(procedure) = self.procedures.get(name).cloned() {
             self.spend()?;
             self.depth += 1;
@@ -289,7 +297,9 @@ impl Session {
             Action::Histogram(query, value, _) => self.histogram(query, value, scope, host),
             Action::ListInformation(_) => Ok(()),
             Action::Refused(what, hint) => scope.unsupported(position, what, hint),
-            Action::Set(query, name, index, value) => self.set(query, name, (index.as_ref(), value.as_ref()), position, scope),
+            Action::Set(query, name, index, value) => {
+                self.set(query, name, (index.as_ref(), value.as_ref()), position, scope)
+            }
             Action::Unset(query, name, value) => self.unset(query, name, value.as_ref(), position, scope),
             Action::Elements(command, target) => self.element_command(*command, target, scope, host),
             other => self.motion_command(other, position, scope, host),
@@ -297,16 +307,22 @@ impl Session {
     }
 
     /// The text of an expression: a text, a variable that holds one, or a formatted one.
-    pub(super) fn text(&mut self, expression: &Expression, scope: &mut Scope) -> Result<String, EvolverError> {
+    pub(super) fn text(
+        &mut self,
+        expression: &Expression,
+        scope: &mut Scope,
+    ) -> Result<String, EvolverError> {
         match expression {
             Expression::Text(text) => Ok(text.to_string()),
             Expression::Name(name, _) if self.texts.contains_key(name) => {
                 Ok(self.texts.get(name).map(ToString::to_string).unwrap_or_default())
             }
-            Expression::Call(name, operands, position) if &**name == "sprintf" => match operands.split_first() {
-                Some((format, rest)) => self.formatted(format, rest, *position, scope),
-                None => scope.fail(*position, "sprintf needs a format"),
-            },
+            Expression::Call(name, operands, position) if &**name == "sprintf" => {
+                match operands.split_first() {
+                    Some((format, rest)) => self.formatted(format, rest, *position, scope),
+                    None => scope.fail(*position, "sprintf needs a format"),
+                }
+            }
             other => Ok(significant(self.evaluate(other, scope)?, 15)),
         }
     }
@@ -421,7 +437,9 @@ impl Session {
         operator: Assignment,
         value: f64,
     ) -> Result<bool, EvolverError> {
-        let Some(at) = self.data.quantities.iter().position(|q| *q.name == *quantity) else { return Ok(false) };
+        let Some(at) = self.data.quantities.iter().position(|q| *q.name == *quantity) else {
+            return Ok(false);
+        };
         let state = &mut self.quantities[at];
         match (name, state.purpose) {
             ("modulus", _) => state.modulus = combined(state.modulus, operator, value),
@@ -433,7 +451,10 @@ impl Session {
     }
 
     /// Sets one attribute of one element.
-    #[expect(clippy::too_many_arguments, reason = "an attribute, its index, how, to what, and where it is said")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "an attribute, its index, how, to what, and where it is said"
+    )]
     pub(super) fn set_attribute(
         &mut self,
         element: Element,
@@ -450,7 +471,9 @@ impl Session {
             ("x" | "x1", None) => Some(0),
             ("y" | "x2", None) => Some(1),
             ("z" | "x3", None) => Some(2),
-            ("x", Some(at)) => super::evaluate::whole(at).and_then(|at| at.checked_sub(1)).filter(|at| *at < 3),
+            ("x", Some(at)) => {
+                super::evaluate::whole(at).and_then(|at| at.checked_sub(1)).filter(|at| *at < 3)
+            }
             _ => None,
         };
         let on = !is_zero(value);
@@ -462,7 +485,8 @@ impl Session {
         }
         match (element.kind, name) {
             (ElementKind::Vertex, _) if axis.is_some() => {
-                self.surface.vertices[VertexId::from_index(element.index)].position[axis.unwrap_or(0)] = value;
+                self.surface.vertices[VertexId::from_index(element.index)].position[axis.unwrap_or(0)] =
+                    value;
             }
             (ElementKind::Vertex, "p1") => {
                 self.surface.vertices[VertexId::from_index(element.index)].parameters[0] = value;
@@ -476,9 +500,15 @@ impl Session {
             (ElementKind::Facet, "tension" | "density") => {
                 self.surface.facets[FacetId::from_index(element.index)].tension = value;
             }
-            (ElementKind::Edge, "no_refine") => self.surface.edges[EdgeId::from_index(element.index)].no_refine = on,
-            (ElementKind::Facet, "no_refine") => self.surface.facets[FacetId::from_index(element.index)].no_refine = on,
-            (ElementKind::Body, _) => return self.set_body(BodyId::from_index(element.index), name, value, position, scope),
+            (ElementKind::Edge, "no_refine") => {
+                self.surface.edges[EdgeId::from_index(element.index)].no_refine = on
+            }
+            (ElementKind::Facet, "no_refine") => {
+                self.surface.facets[FacetId::from_index(element.index)].no_refine = on
+            }
+            (ElementKind::Body, _) => {
+                return self.set_body(BodyId::from_index(element.index), name, value, position, scope);
+            }
             (_, "color" | "frontcolor" | "backcolor") => {
                 if let Some(common) = self.common_mut(element) {
                     common.color = small;

@@ -138,7 +138,9 @@ impl Conversion {
             'x' => format!("{whole:x}"),
             'X' => format!("{whole:X}"),
             'o' => format!("{whole:o}"),
-            'c' => u32::try_from(whole).ok().and_then(char::from_u32).map_or(String::new(), |c| c.to_string()),
+            'c' => {
+                u32::try_from(whole).ok().and_then(char::from_u32).map_or(String::new(), |c| c.to_string())
+            }
             'f' | 'F' if value.is_finite() => format!("{value:.precision$}"),
             'e' | 'E' if value.is_finite() => {
                 let text = format!("{value:.precision$e}");
@@ -171,7 +173,10 @@ mod tests {
         assert_eq!(significant(1e20, 6), "1e+20");
         assert_eq!(significant(0.0001, 6), "0.0001");
         let numbers = |values: &[f64]| values.iter().map(|v| Argument::Number(*v)).collect::<Vec<_>>();
-        assert_eq!(printf("%5.2f|%-6d|%06d", &numbers(&[3.14159, 42.0, 7.0])), Ok(" 3.14|42    |000007".to_owned()));
+        assert_eq!(
+            printf("%5.2f|%-6d|%06d", &numbers(&[3.14159, 42.0, 7.0])),
+            Ok(" 3.14|42    |000007".to_owned())
+        );
         assert_eq!(printf("%.3e %g%%", &numbers(&[12345.678, 0.5])), Ok("1.235e+04 0.5%".to_owned()));
         assert!(printf("%d %d", &numbers(&[1.0])).is_err());
     }

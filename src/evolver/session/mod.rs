@@ -88,8 +88,9 @@ struct Current {
 /// Commands that a session runs before it believes that a loop does not end.
 pub const COMMAND_BUDGET: u64 = 10_000_000;
 
-/// By how much of a body's volume the two ways to measure it may differ: a coarse contact line cuts off some percent.
-const PARTED: f64 = 0.1;
+/// By how much of a body's volume the two ways to measure it may differ: the coarsest contact lines in use cut off less than a
+/// percent.
+const PARTED: f64 = 0.02;
 
 /// The volumes of a body by its integrals and by its closed surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,8 +114,11 @@ impl Session {
     /// [`EvolverError`] if the surface makes no sense.
     pub fn new(document: Document) -> Result<Self, EvolverError> {
         let Document { data, surface, .. } = document;
-        let quantities =
-            data.quantities.iter().map(|q| QuantityState { purpose: q.purpose, modulus: q.modulus }).collect();
+        let quantities = data
+            .quantities
+            .iter()
+            .map(|q| QuantityState { purpose: q.purpose, modulus: q.modulus })
+            .collect();
         let mut descent = Descent::default();
         if let Some((scale, fixed)) = data.scale {
             (descent.scale, descent.fixed) = (scale, fixed);
@@ -157,7 +161,9 @@ impl Session {
     /// Middles for a datafile that says `quadratic` but gives none.
     fn make_quadratic(&mut self) {
         let wanted = self.surface.model;
-        if wanted == super::datafile::Model::Quadratic && self.surface.edges.iter().any(|edge| edge.middle.is_none()) {
+        if wanted == super::datafile::Model::Quadratic
+            && self.surface.edges.iter().any(|edge| edge.middle.is_none())
+        {
             self.surface.model = super::datafile::Model::Linear;
             self.surface.set_model(wanted);
         }
@@ -304,7 +310,11 @@ impl Session {
             .zip(&self.quantities)
             .enumerate()
             .map(|(at, (quantity, state))| {
-                (quantity.name.to_string(), values.functionals[FunctionalId::from_index(first + at)], state.purpose)
+                (
+                    quantity.name.to_string(),
+                    values.functionals[FunctionalId::from_index(first + at)],
+                    state.purpose,
+                )
             })
             .collect())
     }

@@ -1,21 +1,16 @@
 //! Commands that move or refine the surface, and what they report.
 
-use super::{
-    Current, Host, Session,
-    evaluate::Scope,
-    format::significant,
-};
+use super::{Current, Host, Session, evaluate::Scope, format::significant};
 use crate::{
     evolver::{
         command::{Action, Numeric, Simple},
         datafile::{Model, Representation},
         error::EvolverError,
-        language::{expression::Expression, formula::{GRAVITY, is_zero}},
-        physics::{
-            Values,
-            freedom::State,
-            newton::Newton,
+        language::{
+            expression::Expression,
+            formula::{GRAVITY, is_zero},
         },
+        physics::{Values, freedom::State, newton::Newton},
         source::Position,
         surface::{EdgeId, FacetId, VertexId},
     },
@@ -48,7 +43,13 @@ impl Session {
         }
     }
 
-    fn simple(&mut self, simple: &Simple, position: Position, scope: &mut Scope, host: &mut dyn Host) -> Done {
+    fn simple(
+        &mut self,
+        simple: &Simple,
+        position: Position,
+        scope: &mut Scope,
+        host: &mut dyn Host,
+    ) -> Done {
         match simple {
             Simple::Refine => {
                 self.surface.refine();
@@ -185,7 +186,9 @@ impl Session {
             }
             (Numeric::RemoveSmallFacets, Some(value)) => self.remove_small(value, host),
             (Numeric::DivideSkinnyFacets, Some(value)) => self.divide_skinny(value, host),
-            (Numeric::Notch, Some(_)) => scope.fail(position, "not supported: n; refine edges where dihedral > a"),
+            (Numeric::Notch, Some(_)) => {
+                scope.fail(position, "not supported: n; refine edges where dihedral > a")
+            }
             (Numeric::Model, None) => needed("M"),
             (_, None) => needed("this command"),
         }
@@ -254,8 +257,14 @@ impl Session {
         if self.multipliers.iter().all(|m| is_zero(*m)) {
             self.multipliers = current.problem.estimated_multipliers(&current.state)?;
         }
-        let newton =
-            Newton::new(&current.problem, &self.surface, &around, &current.state, &self.multipliers, self.normal)?;
+        let newton = Newton::new(
+            &current.problem,
+            &self.surface,
+            &around,
+            &current.state,
+            &self.multipliers,
+            self.normal,
+        )?;
         Ok((newton, current.values.clone(), current.state.clone()))
     }
 
@@ -363,8 +372,10 @@ impl Session {
         let (moved, after) = current.problem.stepped(&old, &step.velocity, best)?;
         let folded = folded_facets(&self.surface, &old, &moved);
         let taken = best.abs() > 0.0 && folded == 0 && after.energy.is_finite();
-        let (state, after) = if taken { (moved, after) } else { current.problem.stepped(&old, &step.velocity, 0.0)? };
-        let multipliers = if taken { sum(&self.multipliers, &step.multipliers) } else { self.multipliers.clone() };
+        let (state, after) =
+            if taken { (moved, after) } else { current.problem.stepped(&old, &step.velocity, 0.0)? };
+        let multipliers =
+            if taken { sum(&self.multipliers, &step.multipliers) } else { self.multipliers.clone() };
         self.accept(state, after, multipliers)?;
         self.say(host, &format!("  1. stepsize: {}\n", significant(if taken { best } else { 0.0 }, 6)));
         self.report_energy(host)
@@ -377,7 +388,10 @@ impl Session {
         let lowest = values.first().copied().unwrap_or(0.0);
         self.eigenvalue = lowest;
         if lowest >= 0.0 {
-            self.say(host, &format!("Lowest eigenvalue {}: no direction goes down.\n", significant(lowest, 8)));
+            self.say(
+                host,
+                &format!("Lowest eigenvalue {}: no direction goes down.\n", significant(lowest, 8)),
+            );
             return Ok(());
         }
         let Some(current) = &self.problem else { return Ok(()) };
@@ -394,7 +408,10 @@ impl Session {
         }
         let multipliers = current.problem.estimated_multipliers(&moved)?;
         self.accept(moved, after, multipliers)?;
-        self.say(host, &format!("Lowest eigenvalue {}, stepsize {}\n", significant(lowest, 8), significant(best, 6)));
+        self.say(
+            host,
+            &format!("Lowest eigenvalue {}, stepsize {}\n", significant(lowest, 8), significant(best, 6)),
+        );
         self.report_energy(host)
     }
 
@@ -420,8 +437,10 @@ impl Session {
 
     /// `v`: the bodies, with their volumes both ways.
     fn volumes(&mut self, host: &mut dyn Host) -> Done {
-        let mut text =
-            format!("{:>6} {:>20} {:>20} {:>20} {:>20}\n", "Body", "target volume", "actual volume", "closed volume", "pressure");
+        let mut text = format!(
+            "{:>6} {:>20} {:>20} {:>20} {:>20}\n",
+            "Body", "target volume", "actual volume", "closed volume", "pressure"
+        );
         for body in self.bodies()? {
             let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| significant(value, 15));
             let pressure = if body.target.is_some() { Some(body.pressure) } else { None };
@@ -482,8 +501,12 @@ impl Session {
     fn remove_small(&mut self, value: f64, host: &mut dyn Host) -> Done {
         let mut count = 0;
         let mut tried = 0;
-        while let Some(facet) =
-            self.surface.facets.ids().filter(|&id| self.has_films() && self.surface.facet_area(id) < value).nth(tried)
+        while let Some(facet) = self
+            .surface
+            .facets
+            .ids()
+            .filter(|&id| self.has_films() && self.surface.facet_area(id) < value)
+            .nth(tried)
         {
             self.spend()?;
             let shortest = self.surface.facets[facet]
@@ -508,8 +531,11 @@ impl Session {
             return Ok(());
         }
         let skinny = |id: FacetId| {
-            let mut sides: Vec<(f64, EdgeId)> =
-                self.surface.facets[id].edges.iter().map(|d| (self.surface.edge_length(d.edge), d.edge)).collect();
+            let mut sides: Vec<(f64, EdgeId)> = self.surface.facets[id]
+                .edges
+                .iter()
+                .map(|d| (self.surface.edge_length(d.edge), d.edge))
+                .collect();
             sides.sort_by(|a, b| a.0.total_cmp(&b.0));
             let [(a, _), (b, _), (c, longest)] = sides[..] else { return None };
             let cosine = (b * b + c * c - a * a) / (2.0 * b * c);

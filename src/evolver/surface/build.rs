@@ -1,8 +1,8 @@
 //! From the lines of a datafile to the surface. Faces of more than three edges get a vertex in their middle.
 
 use super::{
-    Body, BodyId, BoundaryId, Common, ConstraintId, Directed, Edge, EdgeId, Facet, FacetId, Gone, Surface, Vertex,
-    VertexId,
+    Body, BodyId, BoundaryId, Common, ConstraintId, Directed, Edge, EdgeId, Facet, FacetId, Gone, Surface,
+    Vertex, VertexId,
 };
 use crate::{
     evolver::{
@@ -216,7 +216,8 @@ impl Builder<'_> {
             match self.edges.0.get(&number.abs()) {
                 Some(&edge) => edges.push(Directed { edge, reversed: number < 0 }),
                 None => {
-                    let message = format!("face {} names edge {}, which does not exist", line.id, number.abs());
+                    let message =
+                        format!("face {} names edge {}, which does not exist", line.id, number.abs());
                     return self.fail(line.position, message);
                 }
             }
@@ -311,7 +312,10 @@ impl Builder<'_> {
                     tension: 0.0,
                     no_refine: face.no_refine,
                     noncontent: false,
-                    common: Common { extra: vec![0.0; self.surface.extra_length(ElementKind::Edge)], ..inner.clone() },
+                    common: Common {
+                        extra: vec![0.0; self.surface.extra_length(ElementKind::Edge)],
+                        ..inner.clone()
+                    },
                 })
             })
             .collect();
@@ -364,6 +368,10 @@ impl Builder<'_> {
 impl Surface {
     /// How many numbers the added attributes of a kind hold.
     pub(crate) fn extra_length(&self, kind: ElementKind) -> usize {
-        self.attributes.iter().filter(|attribute| attribute.kind == kind).map(|attribute| attribute.length).sum()
+        self.attributes
+            .iter()
+            .filter(|attribute| attribute.kind == kind)
+            .map(|attribute| attribute.length)
+            .sum()
     }
 }

@@ -2,10 +2,16 @@
 
 use super::{BodyId, EdgeId, Neighbours, Surface};
 use crate::{
-    evolver::{datafile::{Datafile, FaceLine, Representation}, source::Position},
+    evolver::{
+        datafile::{Datafile, FaceLine, Representation},
+        source::Position,
+    },
     index::Id,
 };
-use std::{collections::{BTreeMap, BTreeSet}, fmt};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+};
 
 /// A fault of a surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,7 +133,12 @@ pub fn check(data: &Datafile, surface: &Surface) -> Vec<Fault> {
             // Surface Evolver moves vertices onto their constraints at once; only a visible move is worth a word.
             if constraint.side == crate::evolver::datafile::Side::On && value.abs() > 1e-3 {
                 let constraint = constraint.name.to_string();
-                faults.push(Fault::OffConstraint { vertex: line.id, constraint, value, position: line.position });
+                faults.push(Fault::OffConstraint {
+                    vertex: line.id,
+                    constraint,
+                    value,
+                    position: line.position,
+                });
             }
         }
     }
@@ -137,7 +148,12 @@ pub fn check(data: &Datafile, surface: &Surface) -> Vec<Fault> {
 /// A face of a body: its line and whether the body has it turned round.
 type Sided<'a> = (&'a FaceLine, bool);
 
-fn body_faults(data: &Datafile, surface: &Surface, (body, position): (BodyId, Position), faults: &mut Vec<Fault>) {
+fn body_faults(
+    data: &Datafile,
+    surface: &Surface,
+    (body, position): (BodyId, Position),
+    faults: &mut Vec<Fault>,
+) {
     let Some(line) = data.bodies.get(body.index()) else { return };
     let by_id: BTreeMap<i64, &FaceLine> = data.faces.iter().map(|face| (face.id, face)).collect();
     let faces: Vec<Sided<'_>> = line
@@ -162,7 +178,8 @@ fn body_faults(data: &Datafile, surface: &Surface, (body, position): (BodyId, Po
     if !turned.is_empty() {
         faults.push(Fault::Misoriented { body: line.id, faces: turned, position });
     }
-    let edges_by_id: BTreeMap<i64, EdgeId> = data.edges.iter().map(|edge| edge.id).zip(surface.edges.ids()).collect();
+    let edges_by_id: BTreeMap<i64, EdgeId> =
+        data.edges.iter().map(|edge| edge.id).zip(surface.edges.ids()).collect();
     let closable = |number: &i64| {
         edges_by_id.get(number).is_some_and(|&id| {
             let edge = &surface.edges[id];

@@ -19,8 +19,11 @@ impl Surface {
         let lost = if kept == tail { head } else { tail };
         // What hung on the lost vertex now hangs on the kept one, over the collapsed edge's wrap.
         let shift = if kept == tail { edge.wrap } else { -edge.wrap };
-        let vanishing: Vec<(FacetId, usize)> =
-            if self.representation == Representation::Soapfilm { neighbours.facets[id].clone() } else { Vec::new() };
+        let vanishing: Vec<(FacetId, usize)> = if self.representation == Representation::Soapfilm {
+            neighbours.facets[id].clone()
+        } else {
+            Vec::new()
+        };
         for &other in &neighbours.edges[lost] {
             if other != id {
                 self.reattach(other, lost, kept, shift);
@@ -89,7 +92,8 @@ impl Surface {
                 return false;
             }
             // b leads from the kept vertex to R, c back: c turned is the same line as b.
-            let keep_c = self.edges[c.edge].common.constraints.len() > self.edges[b.edge].common.constraints.len()
+            let keep_c = self.edges[c.edge].common.constraints.len()
+                > self.edges[b.edge].common.constraints.len()
                 || self.edges[c.edge].common.fixed;
             let (from, to) = if keep_c { (b, c) } else { (c, b) };
             let turned = from.reversed == to.reversed;

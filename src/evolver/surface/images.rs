@@ -11,7 +11,10 @@ use glam::{DVec3, IVec3};
 type Sided = (FacetId, usize);
 
 /// For each facet and each of its sides, by how many periods it must be moved to lie on its body's surface.
-pub(crate) fn body_images(surface: &Surface, neighbours: &Neighbours) -> Result<Vec<[IVec3; 2]>, EvolverError> {
+pub(crate) fn body_images(
+    surface: &Surface,
+    neighbours: &Neighbours,
+) -> Result<Vec<[IVec3; 2]>, EvolverError> {
     let mut images = vec![[IVec3::ZERO; 2]; surface.facets.len()];
     if surface.periods.is_none() {
         return Ok(images);
@@ -40,7 +43,9 @@ fn follow(
     let mut queue = vec![start];
     while let Some((facet, side)) = queue.pop() {
         for at in 0..surface.facets[facet].edges.len() {
-            let Some((next, next_at)) = across(surface, neighbours, body, (facet, side), at) else { continue };
+            let Some((next, next_at)) = across(surface, neighbours, body, (facet, side), at) else {
+                continue;
+            };
             if found[next.0.index()][next.1] {
                 continue;
             }

@@ -1,7 +1,10 @@
 //! Better triangles: swaps of edges by Delaunay's criterion, and averages of vertices, as Surface Evolver's `u` and `V`.
 
 use super::{Directed, EdgeId, FacetId, Neighbours, Surface, VertexId};
-use crate::{evolver::datafile::{Model, Representation}, index::Id};
+use crate::{
+    evolver::datafile::{Model, Representation},
+    index::Id,
+};
 use glam::DVec3;
 
 /// The part of the way to the mean that a vertex goes: less than the whole, so that neighbours do not swing past each other.
@@ -179,8 +182,10 @@ impl Surface {
             })
             .map(|&edge| (edge, neighbours.facets[edge].len()))
             .collect();
-        let lines: Vec<(EdgeId, usize)> = usable.iter().copied().filter(|&(_, count)| films && count > 2).collect();
-        let ends: Vec<(EdgeId, usize)> = usable.iter().copied().filter(|&(_, count)| films && count == 1).collect();
+        let lines: Vec<(EdgeId, usize)> =
+            usable.iter().copied().filter(|&(_, count)| films && count > 2).collect();
+        let ends: Vec<(EdgeId, usize)> =
+            usable.iter().copied().filter(|&(_, count)| films && count == 1).collect();
         // Along a line of films or their end only its own neighbours count, and all the same.
         let (taken, even) = if lines.len() >= 3 {
             return None;
@@ -196,8 +201,11 @@ impl Surface {
         }
         let (mut sum, mut total) = (DVec3::ZERO, 0.0);
         for (edge, _) in &taken {
-            let weight =
-                if even { 1.0 } else { neighbours.facets[*edge].iter().map(|&(facet, _)| areas[facet.index()]).sum() };
+            let weight = if even {
+                1.0
+            } else {
+                neighbours.facets[*edge].iter().map(|&(facet, _)| areas[facet.index()]).sum()
+            };
             let reversed = self.edges[*edge].ends[0] != id;
             sum += weight * weight * self.side(Directed { edge: *edge, reversed });
             total += weight * weight;
@@ -216,7 +224,12 @@ impl Surface {
     }
 
     /// The normals along which an averaged vertex must not move; `None` where it must not move at all.
-    fn normals_at(&self, id: VertexId, neighbours: &Neighbours, taken: &[(EdgeId, usize)]) -> Option<Vec<DVec3>> {
+    fn normals_at(
+        &self,
+        id: VertexId,
+        neighbours: &Neighbours,
+        taken: &[(EdgeId, usize)],
+    ) -> Option<Vec<DVec3>> {
         let outward = |edge: EdgeId| self.side(Directed { edge, reversed: self.edges[edge].ends[0] != id });
         let line = self.representation == Representation::String
             || taken.iter().any(|&(edge, _)| neighbours.facets[edge].len() > 2);

@@ -259,7 +259,8 @@ impl Surface {
     #[must_use]
     pub fn area_vector(&self, facet: FacetId) -> DVec3 {
         let count = self.facets[facet].edges.len();
-        let places: Vec<DVec3> = self.corners(facet)[..count].iter().map(|&corner| self.place(corner)).collect();
+        let places: Vec<DVec3> =
+            self.corners(facet)[..count].iter().map(|&corner| self.place(corner)).collect();
         let Some(&origin) = places.first() else { return DVec3::ZERO };
         0.5 * places.windows(2).map(|pair| (pair[0] - origin).cross(pair[1] - origin)).sum::<DVec3>()
     }
@@ -269,7 +270,9 @@ impl Surface {
     pub fn facet_area(&self, facet: FacetId) -> f64 {
         let nodes: Vec<DVec3> = self.corners(facet).into_iter().map(|corner| self.place(corner)).collect();
         match (self.representation, nodes.len()) {
-            (Representation::Soapfilm, 6) => crate::foam::energy::element_area(crate::foam::complex::Shape::Tri6, &nodes),
+            (Representation::Soapfilm, 6) => {
+                crate::foam::energy::element_area(crate::foam::complex::Shape::Tri6, &nodes)
+            }
             (Representation::Soapfilm, _) => self.area_vector(facet).length(),
             (Representation::String, _) => self.area_vector(facet).z,
         }
@@ -280,7 +283,8 @@ impl Surface {
     pub fn edge_length(&self, edge: EdgeId) -> f64 {
         let Some(middle) = self.edges[edge].middle else { return self.chord(edge) };
         let tail = self.vertices[self.edges[edge].ends[0]].position;
-        let nodes = [tail, self.vertices[middle].position, tail + self.side(Directed { edge, reversed: false })];
+        let nodes =
+            [tail, self.vertices[middle].position, tail + self.side(Directed { edge, reversed: false })];
         crate::foam::complex::curve_points(3, 4)
             .iter()
             .map(|point| point.weight * (0..3).map(|i| point.dt[i] * nodes[i]).sum::<DVec3>().length())

@@ -21,7 +21,8 @@ impl Neighbours {
                 facets[directed.edge].push((id, at));
             }
         }
-        let mut edges: IndexVec<VertexId, Vec<EdgeId>> = IndexVec::from_elem(Vec::new(), surface.vertices.len());
+        let mut edges: IndexVec<VertexId, Vec<EdgeId>> =
+            IndexVec::from_elem(Vec::new(), surface.vertices.len());
         for (id, edge) in surface.edges.enumerated() {
             for end in edge.ends {
                 edges[end].push(id);
@@ -32,8 +33,10 @@ impl Neighbours {
 
     /// The facets at a vertex, each once, in order.
     pub(crate) fn facets_at(&self, vertex: VertexId) -> Vec<FacetId> {
-        let mut found: Vec<FacetId> =
-            self.edges[vertex].iter().flat_map(|&edge| self.facets[edge].iter().map(|&(facet, _)| facet)).collect();
+        let mut found: Vec<FacetId> = self.edges[vertex]
+            .iter()
+            .flat_map(|&edge| self.facets[edge].iter().map(|&(facet, _)| facet))
+            .collect();
         found.sort_by_key(|id| id.index());
         found.dedup();
         found

@@ -2,23 +2,24 @@
 
 use super::{Common, Directed, Edge, EdgeId, Facet, FacetId, Neighbours, Surface, Vertex, VertexId};
 use crate::{
-    evolver::{datafile::{Model, Representation}, language::expression::ElementKind},
+    evolver::{
+        datafile::{Model, Representation},
+        language::expression::ElementKind,
+    },
     index::{Id, IndexVec},
 };
 use glam::{DVec3, IVec3};
 
 /// How a new vertex on a boundary gets its parameters.
 fn between(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    let mut out = [0.0; 2];
-    for axis in 0..2 {
+    std::array::from_fn(|axis| {
         // An angle may pass its end: the shorter way round is meant.
         let mut step = b[axis] - a[axis];
         if step.abs() > std::f64::consts::PI {
             step -= step.signum() * std::f64::consts::TAU;
         }
-        out[axis] = a[axis] + 0.5 * step;
-    }
-    out
+        a[axis] + 0.5 * step
+    })
 }
 
 impl Surface {
@@ -194,7 +195,12 @@ impl Surface {
     }
 
     /// Divides a triangle whose edges are all divided: it keeps the inner triangle, the three at the corners are new.
-    fn quarter(&mut self, id: FacetId, far: &IndexVec<EdgeId, Option<EdgeId>>, inner: Option<[DVec3; 3]>) -> Vec<Facet> {
+    fn quarter(
+        &mut self,
+        id: FacetId,
+        far: &IndexVec<EdgeId, Option<EdgeId>>,
+        inner: Option<[DVec3; 3]>,
+    ) -> Vec<Facet> {
         let facet = self.facets[id].clone();
         let parts: Vec<[Directed; 2]> = facet.edges.iter().map(|&d| two_halves(d, far)).collect();
         let mut wrap = IVec3::ZERO;
@@ -246,7 +252,8 @@ impl Surface {
             let start = (self.tail(a), IVec3::ZERO);
             let end = (self.head(b), self.wrap(a) + self.wrap(b));
             let chord = self.chord_within(&facet, start, end, None);
-            pieces.push(Facet { edges: vec![a, b, Directed { edge: chord, reversed: true }], ..facet.clone() });
+            pieces
+                .push(Facet { edges: vec![a, b, Directed { edge: chord, reversed: true }], ..facet.clone() });
             rest[at] = (Directed { edge: chord, reversed: false }, leads_to_new);
             rest.remove((at + 1) % count);
         }

@@ -68,7 +68,8 @@ impl SymmetricPattern {
     /// [`FactorError`] if a pivot vanishes or memory is short.
     pub(crate) fn factor(&self, entries: &[f64]) -> Result<SymmetricFactor<'_>, FactorError> {
         let memory = FactorError::Memory { unknowns: self.size };
-        let matrix = SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, entries).map_err(|_| memory)?;
+        let matrix =
+            SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, entries).map_err(|_| memory)?;
         let parallel = if self.size >= PARALLEL { Par::rayon(0) } else { Par::Seq };
         let mut values = vec![0.0; self.cholesky.len_val()];
         let scratch = self.cholesky.factorize_numeric_ldlt_scratch::<f64>(parallel, Default::default());
