@@ -1,5 +1,7 @@
 //! Foams of two layers against their derivation and Plateau's laws.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail by a panic, too")]
+
 use combwright::foam::{
     layers::{
         Arrangement, Division, Layers, NoLayers, corner_angles, layer_figures, plane_end, relaxed, sheets,
