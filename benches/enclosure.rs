@@ -6,7 +6,7 @@
 #![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
 
 use combwright::{
-    enclosure::{Move, Shell, shell_from_level},
+    enclosure::{BuildError, Move, shell_from_level},
     mesh::{ClosedMesh, Grid, measure, self_intersections, write_stl},
     surface::{SchwarzP, WallSide},
 };
@@ -32,20 +32,17 @@ fn grid(samples: usize) -> Grid {
     Grid { low: DVec3::ZERO, high: DVec3::new(1.0, 1.0, 0.5), cells: [samples, samples, samples / 2] }
 }
 
-fn shells(samples: usize) -> Result<[Shell; 2], AnyError> {
+fn solid(samples: usize, side: WallSide, sign: f64) -> Result<ClosedMesh, BuildError> {
     let surface = SchwarzP { period: 1.0 };
-    let shell = |side, sign: f64| {
-        shell_from_level(&surface, sign * LEVELS[0], Move::ToLevel(sign * LEVELS[1]), &grid(samples), side)
-    };
-    Ok([shell(WallSide::Lower, -1.0)?, shell(WallSide::Upper, 1.0)?])
+    let [front, back] = LEVELS.map(|level| sign * level);
+    let shell = shell_from_level(&surface, front, Move::ToLevel(back), &grid(samples), side)?;
+    Ok(shell.solid(None)?.scaled_and_moved(PERIOD_MM, DVec3::ZERO))
 }
 
 fn solids(samples: usize) -> Result<[ClosedMesh; 2], AnyError> {
-    let [inner, outer] = shells(samples)?;
-    let to_mm = |shell: Shell| -> Result<ClosedMesh, AnyError> {
-        Ok(shell.solid(None)?.scaled_and_moved(PERIOD_MM, DVec3::ZERO))
-    };
-    Ok([to_mm(inner)?, to_mm(outer)?])
+    let (inner, outer) =
+        rayon::join(|| solid(samples, WallSide::Lower, -1.0), || solid(samples, WallSide::Upper, 1.0));
+    Ok([inner?, outer?])
 }
 
 /// The most memory that this process has held, in MB.

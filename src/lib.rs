@@ -12,12 +12,15 @@
 //! | [`surface`] | level sets, curvature, nearest points, the gap |
 //! | [`foam`] | the ideal foam between two walls: seeds, partition, relaxed films |
 //! | [`tessellation`] | who touches whom, sides, defects, distributions |
+//! | [`compare`] | comb against foam, with its uncertainty |
 //! | [`report`] | tables, figures, files |
 //!
 //! The library prints nothing. The program `combwright` is built with the feature `cli`.
 
 pub mod comb;
+pub mod compare;
 pub mod enclosure;
+pub mod evolver;
 pub mod foam;
 pub mod index;
 pub mod mesh;

@@ -180,6 +180,9 @@ pub(super) struct FoamArguments {
     /// Threads; the results do not depend on it [default: all]
     #[arg(short = 'j', long, value_name = "J", help_heading = "Run")]
     pub(super) jobs: Option<usize>,
+    /// Write the relaxed foam into the folder as a datafile of Surface Evolver, under this name
+    #[arg(long, value_name = "NAME", help_heading = "Run")]
+    pub(super) write_fe: Option<String>,
     /// The folder for the results
     #[arg(short = 'o', long, value_name = "FOLDER", default_value = "foam-out", help_heading = "Run")]
     pub(super) output: PathBuf,

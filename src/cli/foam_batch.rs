@@ -71,6 +71,7 @@ pub(super) fn run(settings: &FoamSettings) -> Result<(), CliError> {
         let first = rows.first().map_or("interrupted before the first ended", |row| &row.ended);
         return Err(CliError::failure(anyhow!("none of {} runs converged; the first: {first}", rows.len())));
     };
+    let made = made.with_lowest_eigenvalue(&gap);
     let chart = foam_chart::energies(&energies).map_err(CliError::failure)?;
     folder.write_bytes("runs.svg", chart.svg().as_bytes())?;
     let seconds = vec![("all runs", began.elapsed().as_secs_f64())];

@@ -7,7 +7,9 @@ use super::{
     interrupt,
 };
 use crate::{
+    evolver::write::foam_datafile,
     foam::{
+        audit::{Audit, audit},
         checkpoint::{Checkpoint, StepRecord},
         energy::energy,
         flat_hexagonal_energy,
@@ -89,6 +91,10 @@ pub(super) struct Figures {
     pub(super) residual: f64,
     /// Directions of negative curvature: 0 at a minimum.
     pub(super) unstable_directions: usize,
+    /// The lowest eigenvalue of the Hessian at constant volumes.
+    lowest_eigenvalue: Option<f64>,
+    /// Pressures against sides and curvature, cell by cell.
+    audit: Audit,
     psi6_of_seeds: f64,
     #[serde(flatten)]
     pub(super) ended: Stop,
@@ -126,7 +132,7 @@ pub(super) fn run(
         ("seeds and partition", until_partition),
         ("relaxation", began.elapsed().as_secs_f64() - until_partition),
     ];
-    let made = Made::new(&job, gap, relaxed, keeper.record)?;
+    let made = Made::new(&job, gap, relaxed, keeper.record)?.with_lowest_eigenvalue(gap);
     write_all(&mut folder, &job, settings, gap, &made, Some(&start.seeds), seconds)?;
     bar.finish_and_clear();
     end(folder, &job, &made)
@@ -147,7 +153,7 @@ pub(super) fn resume(checkpoint: Checkpoint, mut settings: FoamSettings) -> Resu
     let mut keeper = Keeper::new(&job, &bar, Some(folder.target().join(CHECKPOINT)), record);
     let relaxed = keeper.relax(Begin::State(state), &gap)?;
     let seconds = vec![("relaxation, resumed", began.elapsed().as_secs_f64())];
-    let made = Made::new(&job, &gap, relaxed, keeper.record)?;
+    let made = Made::new(&job, &gap, relaxed, keeper.record)?.with_lowest_eigenvalue(&gap);
     write_all(&mut folder, &job, &settings, &gap, &made, None, seconds)?;
     bar.finish_and_clear();
     end(folder, &job, &made)
@@ -286,10 +292,22 @@ impl Made {
             newton_steps: state.steps,
             residual: relaxed.residuals.force,
             unstable_directions: relaxed.unstable,
+            lowest_eigenvalue: None,
+            audit: audit(state, gap),
             psi6_of_seeds: job.psi6,
             ended: relaxed.stop,
         };
         Ok(Self { relaxed, record, figures, pattern, cells })
+    }
+}
+
+impl Made {
+    /// With the lowest eigenvalue of a converged foam, which takes about as long as some Newton steps.
+    pub(super) fn with_lowest_eigenvalue(mut self, gap: &Gap) -> Self {
+        if matches!(self.figures.ended, Stop::Converged { .. }) {
+            self.figures.lowest_eigenvalue = relax::lowest_eigenvalue(&self.relaxed.state, gap).ok();
+        }
+        self
     }
 }
 
@@ -334,6 +352,12 @@ pub(super) fn write_all(
     if let Some(seeds) = seeds {
         foam_run::write_seeds(folder, seeds)?;
     }
+    if let Some(name) = &settings.write_fe {
+        let complex = state.strips.complex(&state.network, gap);
+        let title = format!("{}, N = {}, by combwright {}", job.space, made.figures.cells, env!("CARGO_PKG_VERSION"));
+        let text = foam_datafile(&job.space, &complex, &state.places, &title).map_err(CliError::mistake)?;
+        folder.write_bytes(name.as_str(), text.as_bytes())?;
+    }
     folder.write_json("summary.json", &made.figures)?;
     foam_run::write_run(folder, settings, seconds, &in_words(made.figures.ended))
 }
@@ -373,6 +397,17 @@ fn end(folder: OutputFolder, job: &Job, made: &Made) -> Result<(), CliError> {
     }
 }
 
+/// The audit in one line: how well pressures agree with sides and curvature.
+fn audit_in_words(audit: &Audit) -> String {
+    match audit.correlation {
+        Some(correlation) => format!(
+            "correlation {correlation:.6} (rms difference {:.1e} of {:.1e})",
+            audit.rms_difference, audit.rms_signal
+        ),
+        None => format!("all cells alike, rms difference {:.1e}", audit.rms_difference),
+    }
+}
+
 fn table(figures: &Figures) -> Vec<Line> {
     vec![
         ("space", figures.space.clone()),
@@ -388,5 +423,10 @@ fn table(figures: &Figures) -> Vec<Line> {
         ("T1s", figures.t1_count.to_string()),
         ("residual", format!("{:.1e}", figures.residual)),
         ("unstable directions", figures.unstable_directions.to_string()),
+        (
+            "lowest eigenvalue",
+            figures.lowest_eigenvalue.map_or("-".to_owned(), |value| format!("{value:.2e}")),
+        ),
+        ("law of the thin limit", audit_in_words(&figures.audit)),
     ]
 }

@@ -56,6 +56,8 @@ pub(super) struct FoamSettings {
     #[serde(skip)]
     pub(super) jobs: Option<usize>,
     #[serde(skip)]
+    pub(super) write_fe: Option<String>,
+    #[serde(skip)]
     pub(super) output: PathBuf,
 }
 
@@ -114,6 +116,7 @@ impl FoamSettings {
             last_stage,
             runs: arguments.runs,
             jobs: arguments.jobs,
+            write_fe: arguments.write_fe.clone(),
             output: arguments.output.clone(),
         })
     }

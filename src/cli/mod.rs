@@ -9,7 +9,9 @@
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
 //! | `foam bubble`, `foam --layers 2` | `foam_bubble.rs`, `foam_layers.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
+//! | `evolver check`, `evolver run` | `evolver.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
+//! | `compare` | `compare.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
@@ -18,7 +20,9 @@
 mod comb;
 mod comb_render;
 mod comb_score;
+mod compare;
 mod enclosure;
+mod evolver;
 mod foam;
 mod foam_batch;
 mod foam_bubble;
@@ -52,6 +56,9 @@ enum Command {
     Foam(Box<foam::FoamArguments>),
     /// Read the cells of comb and their numbers of sides from photographs
     Comb(Box<comb::CombArguments>),
+    /// Read, check and run datafiles of Surface Evolver
+    Evolver(evolver::EvolverArguments),
+    Compare(compare::CompareArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -66,6 +73,8 @@ pub fn main() -> ExitCode {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
         Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
+        Command::Evolver(arguments) => evolver::run(&arguments),
+        Command::Compare(compare) => compare::run(&compare),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };

@@ -94,6 +94,13 @@ impl PitchField {
         Self { bin, columns, rows, pitches }
     }
 
+    /// The same field in a raster of `factor` times as many pixels along each axis.
+    pub(crate) fn scaled(mut self, factor: f64) -> Self {
+        self.bin *= factor;
+        self.pitches.iter_mut().for_each(|p| *p *= factor);
+        self
+    }
+
     /// The pitch at a point.
     pub(crate) fn at(&self, point: DVec2) -> f64 {
         let column = super::plane::pixel(point.x / self.bin, self.columns);

@@ -1,31 +1,29 @@
 //! Light and wall colour: one raster in which walls are bright, whatever the photograph's light and colours.
 
-use super::{photo::Colours, pitch::Polarity, plane::Plane};
+use super::{
+    pitch::Polarity,
+    plane::{Plane, narrow, pixel},
+    raster::Raster,
+    smooth::Smooth,
+};
 use faer::{Col, Mat, Side, prelude::Solve};
 use glam::DVec2;
 
 /// Width over which the light is levelled, in pitches.
 const LIGHT_REACH: f64 = 1.2;
+/// Cut of the first levelling, so that one glint does not set the contrast of its surroundings.
+const DETAIL: f32 = 2.0;
 /// Walls are at about +1 after levelling; anything brighter is a glint and is cut.
-const GLINT: f32 = 1.6;
+pub(crate) const GLINT: f32 = 1.6;
 /// Weight of the prior (grey walls) in the wall colour, as a share of the colours' variance.
 const COLOUR_RIDGE: f64 = 0.05;
 
 /// Number of colour features: red, green, blue, the least and the greatest of them.
 const FEATURES: usize = 5;
 
-impl Colours {
-    /// Mean of the three channels.
-    #[must_use]
-    pub(crate) fn grey(&self) -> Plane {
-        let [r, g, b] = &self.channels;
-        Plane::from_fn(r.width(), r.height(), |x, y| (r.at(x, y) + g.at(x, y) + b.at(x, y)) / 3.0)
-    }
-
-    fn features(&self, x: usize, y: usize) -> [f32; FEATURES] {
-        let [r, g, b] = [0, 1, 2].map(|c| self.channels[c].at(x, y));
-        [r, g, b, r.min(g).min(b), r.max(g).max(b)]
-    }
+/// What the wall colour is learned from.
+fn features([r, g, b]: [f32; 3]) -> [f32; FEATURES] {
+    [r, g, b, r.min(g).min(b), r.max(g).max(b)]
 }
 
 /// A linear measure of a pixel's colour that is greatest for walls.
@@ -45,12 +43,12 @@ impl WallColour {
     ///
     /// The least and the greatest channel are features beside the three channels, since pale wax against amber pollen and
     /// against a blue base differ in the least one. `None` where the points do not tell.
-    pub(crate) fn learned(colours: &Colours, walls: &[DVec2], cells: &[DVec2]) -> Option<Self> {
+    pub(crate) fn learned(raster: &Raster<'_>, walls: &[DVec2], cells: &[DVec2]) -> Option<Self> {
         if walls.len() < 12 || cells.len() < 12 {
             return None;
         }
-        let (wall, wall_scatter) = moments(colours, walls);
-        let (cell, cell_scatter) = moments(colours, cells);
+        let (wall, wall_scatter) = moments(raster, walls);
+        let (cell, cell_scatter) = moments(raster, cells);
         let mut matrix = [[0.0; FEATURES]; FEATURES];
         let mut difference = [0.0; FEATURES];
         for i in 0..FEATURES {
@@ -68,47 +66,61 @@ impl WallColour {
         let solution = matrix.llt(Side::Lower).ok()?.solve(&right);
         let weights: [f64; FEATURES] = std::array::from_fn(|i| solution[i]);
         let scale: f64 = weights.iter().map(|w| w.abs()).sum();
-        (scale > 0.0).then(|| Self { weights: weights.map(|w| super::plane::narrow(w / scale)) })
+        (scale > 0.0).then(|| Self { weights: weights.map(|w| narrow(w / scale)) })
     }
 
-    /// The measure of every pixel.
-    pub(crate) fn of(&self, colours: &Colours) -> Plane {
-        let red = &colours.channels[0];
-        Plane::from_fn(red.width(), red.height(), |x, y| {
-            colours.features(x, y).iter().zip(&self.weights).map(|(f, w)| f * w).sum()
-        })
+    /// The measure of a colour.
+    pub(crate) fn of(&self, colour: [f32; 3]) -> f32 {
+        features(colour).iter().zip(&self.weights).map(|(f, w)| f * w).sum()
     }
 }
 
 /// Levels the light: minus the local mean, over the local root mean square, glints cut.
 pub(crate) fn levelled(wallness: &Plane, pitch: f64) -> Plane {
     let reach = LIGHT_REACH * pitch;
-    let once = level(wallness, reach);
-    level(&once, reach).map(|v| v.clamp(-GLINT, GLINT))
+    level(&level(wallness, reach, DETAIL), reach, GLINT)
 }
 
-fn level(grey: &Plane, reach: f64) -> Plane {
-    let detail = grey.zip(&grey.blurred(reach), |v, m| v - m);
-    let power = detail.map(|v| v * v).blurred(reach);
-    detail.zip(&power, |v, p| (v / (p + 1e-6).sqrt()).clamp(-2.0, 2.0))
+/// Local mean taken off and local root mean square brought to 1; what exceeds `limit` is cut.
+fn level(grey: &Plane, reach: f64, limit: f32) -> Plane {
+    let (width, height) = (grey.width(), grey.height());
+    let mean = Smooth::mean(width, height, reach, |y, row| row.copy_from_slice(grey.row(y)));
+    let detail = |y: usize, row: &mut [f32]| {
+        mean.row(y, row);
+        row.iter_mut().zip(grey.row(y)).for_each(|(m, v)| *m = v - *m);
+    };
+    let power = Smooth::mean(width, height, reach, |y, row| {
+        detail(y, row);
+        row.iter_mut().for_each(|d| *d *= *d);
+    });
+    let mut levelled = Plane::new(width, height, 0.0);
+    levelled.fill_rows_with(
+        || vec![0.0; width],
+        |powers, y, row| {
+            detail(y, row);
+            power.row(y, powers);
+            for (v, p) in row.iter_mut().zip(&*powers) {
+                *v = (*v / (p + 1e-6).sqrt()).clamp(-limit, limit);
+            }
+        },
+    );
+    levelled
 }
 
 type Moments = ([f64; FEATURES], [[f64; FEATURES]; FEATURES]);
 
-fn moments(colours: &Colours, points: &[DVec2]) -> Moments {
-    let red = &colours.channels[0];
+fn moments(raster: &Raster<'_>, points: &[DVec2]) -> Moments {
     let at = |p: &DVec2| {
-        colours
-            .features(super::plane::pixel(p.x, red.width()), super::plane::pixel(p.y, red.height()))
-            .map(f64::from)
+        features(raster.colour(pixel(p.x, raster.width()), pixel(p.y, raster.height()))).map(f64::from)
     };
+    let seen: Vec<[f64; FEATURES]> = points.iter().map(at).collect();
     let count = points.len() as f64;
     let mut mean = [0.0; FEATURES];
-    for features in points.iter().map(at) {
+    for features in &seen {
         mean.iter_mut().zip(features).for_each(|(m, f)| *m += f / count);
     }
     let mut scatter = [[0.0; FEATURES]; FEATURES];
-    for features in points.iter().map(at) {
+    for features in &seen {
         for i in 0..FEATURES {
             for j in 0..FEATURES {
                 scatter[i][j] += (features[i] - mean[i]) * (features[j] - mean[j]) / count;

@@ -6,11 +6,11 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | read the file, bring it to another scale | `photo.rs`, `plane.rs` |
+//! | read the file, bring it to another scale | `photo.rs`, `raster.rs`, `plane.rs` |
 //! | find the pitch: the scale at which most of the photograph is a hexagonal lattice | `pitch.rs`, `peaks.rs` |
-//! | level the light; learn the colour of walls against that of cells | `light.rs` |
-//! | find the cells: blobs that continue a lattice, hidden cells inferred between them | `lattice.rs`, `grid.rs` |
-//! | share the pixels among the cells: watershed on the walls | `watershed.rs`, `distance.rs` |
+//! | level the light; learn the colour of walls against that of cells | `light.rs`, `smooth.rs` |
+//! | find the cells: blobs that continue a lattice, hidden cells inferred between them | `survey.rs`, `lattice.rs`, `grid.rs` |
+//! | share the pixels among the cells: watershed on the walls | `watershed.rs`, `terrain.rs` |
 //! | measure each cell and each wall; seen, hidden, or beyond the comb | `walls.rs`, `evidence.rs`, `kinds.rs` |
 //! | count sides by walls and by Delaunay neighbours, decide, say how sure | `sides.rs`, `triangulation.rs`, `cell_status.rs` |
 //! | all of this in order; the result in pixels of the photograph | `read.rs`, `comb_pattern.rs` |
@@ -33,7 +33,6 @@
 mod cell_status;
 mod comb_pattern;
 mod corrections;
-mod distance;
 mod evidence;
 mod grid;
 mod kinds;
@@ -43,11 +42,15 @@ mod peaks;
 mod photo;
 mod pitch;
 mod plane;
+mod raster;
 mod read;
 mod score;
 mod sides;
+mod smooth;
+mod survey;
 pub mod synthetic;
 mod table;
+mod terrain;
 mod triangulation;
 mod walls;
 mod watershed;
@@ -57,6 +60,7 @@ use crate::{
     tessellation::{CellId, CellPattern, PatternDefect},
 };
 use glam::DVec2;
+use raster::Pyramid;
 
 pub use comb_pattern::CellDetail;
 pub use corrections::{Correction, CorrectionError, Corrections};
@@ -91,12 +95,11 @@ impl Mask {
     /// Hides every pixel of `picture` that is brighter than half.
     #[must_use]
     pub fn from_picture(picture: &Photo) -> Self {
-        let part = Part { left: 0, top: 0, width: picture.width(), height: picture.height() };
-        let grey = picture.resampled(part, part.width, part.height).grey();
+        let bright = |pixel: &image::Rgb<u8>| pixel.0.iter().map(|v| u32::from(*v)).sum::<u32>() > 3 * 127;
         Self {
-            width: part.width,
-            height: part.height,
-            hidden: grey.data().iter().map(|v| *v > 0.5).collect(),
+            width: picture.width(),
+            height: picture.height(),
+            hidden: picture.to_rgb8().pixels().map(bright).collect(),
         }
     }
 
@@ -199,14 +202,15 @@ pub fn read(photo: &Photo, settings: &Settings) -> Result<Comb, CombError> {
     if let Some(pitch) = settings.pitch.filter(|p| !(LEAST_PITCH..=320.0).contains(p)) {
         return Err(CombError::Pitch { pitch });
     }
-    let estimate = pitch::find(photo, part, settings.pitch).ok_or(CombError::NoComb)?;
+    let pyramid = Pyramid::of(photo, part);
+    let estimate = pitch::find(&pyramid, settings.pitch).ok_or(CombError::NoComb)?;
     if estimate.coverage < read::LEAST_COVERAGE {
         return Err(CombError::NoComb);
     }
     if estimate.pitch < LEAST_PITCH {
         return Err(CombError::TooFine { pitch: estimate.pitch });
     }
-    let reading = read::read(photo, part, estimate, settings)?;
+    let reading = read::read(&pyramid, estimate, settings)?;
     if reading.seen() < read::LEAST_CELLS {
         return Err(CombError::NoComb);
     }

@@ -2,6 +2,7 @@
 
 use super::plane::Plane;
 use glam::DVec2;
+use rayon::prelude::*;
 
 /// Widths of the band-pass in pitches. Its response is greatest for a lattice of exactly the pitch and half of that for
 /// one a third larger or smaller.
@@ -40,17 +41,14 @@ pub(crate) fn difference(grey: &Plane, pitch: f64) -> Plane {
 /// All maxima of at least `threshold` that are greatest among their eight neighbours; border pixels count.
 #[must_use]
 pub(crate) fn maxima(response: &Plane, threshold: f32) -> Vec<Peak> {
-    let (width, height) = (response.width(), response.height());
-    let mut found = Vec::new();
-    for y in 0..height {
-        for x in 0..width {
-            let value = response.at(x, y);
-            if value >= threshold && is_greatest(response, x, y) {
-                found.push(Peak { position: refined(response, x, y), strength: f64::from(value) });
-            }
-        }
-    }
-    found
+    let in_row = |y: usize| {
+        let row = response.row(y).iter().enumerate().filter(|(_, value)| **value >= threshold);
+        let greatest = row.filter(|(x, _)| is_greatest(response, *x, y));
+        greatest
+            .map(|(x, value)| Peak { position: refined(response, x, y), strength: f64::from(*value) })
+            .collect::<Vec<Peak>>()
+    };
+    (0..response.height()).into_par_iter().with_min_len(32).flat_map_iter(in_row).collect()
 }
 
 fn is_greatest(response: &Plane, x: usize, y: usize) -> bool {

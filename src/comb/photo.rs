@@ -1,6 +1,5 @@
-//! Reading a photograph and bringing it to another scale.
+//! Reading a photograph.
 
-use super::plane::{Plane, narrow, pixel};
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageReader, Limits, Rgb, RgbImage};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -48,14 +47,7 @@ pub struct Photo {
 #[derive(Clone, Debug)]
 enum Pixels {
     Eight(RgbImage),
-    Sixteen(ImageBuffer<Rgb<u16>, Vec<u16>>),
-}
-
-/// Red, green and blue in 0..=1 as stored (not linearised), at some scale of the photograph.
-#[derive(Clone, Debug)]
-pub(crate) struct Colours {
-    /// The three channels.
-    pub(crate) channels: [Plane; 3],
+    Sixteen(Image<u16>),
 }
 
 impl Photo {
@@ -123,41 +115,62 @@ impl Photo {
         }
     }
 
-    /// The part that starts at (`left`, `top`), of `width` x `height` pixels of the photograph, as a raster of
-    /// `out_width` x `out_height`: means over the area of each pixel when shrinking, bilinear when enlarging.
-    #[must_use]
-    pub(crate) fn resampled(&self, part: Part, out_width: usize, out_height: usize) -> Colours {
-        let mut interleaved = vec![[0.0_f32; 3]; out_width * out_height];
-        let spans = Spans::new(part.left, part.width, out_width, self.width());
-        let rows = Spans::new(part.top, part.height, out_height, self.height());
-        interleaved.par_chunks_mut(out_width.max(1)).enumerate().for_each_init(
-            || vec![[0.0_f32; 3]; self.width()],
-            |sums, (y, out)| {
-                sums.fill([0.0; 3]);
-                for (source, weight) in rows.of(y) {
-                    self.add_row(source, weight, &mut sums[part.left..part.left + part.width], part.left);
-                }
-                for (x, pixel) in out.iter_mut().enumerate() {
-                    for (source, weight) in spans.of(x) {
-                        for (p, s) in pixel.iter_mut().zip(sums[source]) {
-                            *p += weight * s;
-                        }
-                    }
-                }
-            },
-        );
-        let channel =
-            |c: usize| Plane::from_fn(out_width, out_height, |x, y| interleaved[y * out_width + x][c]);
-        Colours { channels: [channel(0), channel(1), channel(2)] }
-    }
-
-    fn add_row(&self, y: usize, weight: f32, sums: &mut [[f32; 3]], left: usize) {
-        let range = (y * self.width() + left) * 3..(y * self.width() + left + sums.len()) * 3;
+    /// Columns of a row, as stored.
+    pub(crate) fn row(&self, y: usize, columns: std::ops::Range<usize>) -> Samples<'_> {
+        let start = y * self.width();
+        let range = 3 * (start + columns.start)..3 * (start + columns.end);
         match &self.pixels {
-            Pixels::Eight(image) => add(sums, &image.as_raw()[range], weight / f32::from(u8::MAX)),
-            Pixels::Sixteen(image) => add(sums, &image.as_raw()[range], weight / f32::from(u16::MAX)),
+            Pixels::Eight(image) => Samples::Eight(&image.as_raw()[range]),
+            Pixels::Sixteen(image) => Samples::Sixteen(&image.as_raw()[range]),
         }
     }
+
+    /// A part at half its size: the mean of each two by two pixels, rounded; an odd last row or column counts twice.
+    pub(crate) fn halved(&self, part: Part) -> Self {
+        let pixels = match &self.pixels {
+            Pixels::Eight(image) => Pixels::Eight(halved(image, part)),
+            Pixels::Sixteen(image) => Pixels::Sixteen(halved(image, part)),
+        };
+        Self { pixels }
+    }
+}
+
+/// Red, green and blue in turn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Samples<'a> {
+    /// Of 8 bits.
+    Eight(&'a [u8]),
+    /// Of 16 bits.
+    Sixteen(&'a [u16]),
+}
+
+type Image<T> = ImageBuffer<Rgb<T>, Vec<T>>;
+
+fn halved<T>(image: &Image<T>, part: Part) -> Image<T>
+where
+    T: image::Primitive + Into<u32> + TryFrom<u32> + Send + Sync,
+    Rgb<T>: image::Pixel<Subpixel = T>,
+{
+    let [width, height] = [part.width, part.height].map(|length| length.div_ceil(2));
+    let mut data = vec![T::DEFAULT_MIN_VALUE; 3 * width * height];
+    let stride = 3 * image.width() as usize;
+    data.par_chunks_mut((3 * width).max(1)).enumerate().for_each(|(y, out)| {
+        let source = |offset: usize| {
+            let row = part.top + (2 * y + offset).min(part.height - 1);
+            &image.as_raw()[row * stride + 3 * part.left..row * stride + 3 * (part.left + part.width)]
+        };
+        let (upper, lower) = (source(0), source(1));
+        for (x, pixel) in out.chunks_exact_mut(3).enumerate() {
+            let (one, two) = (6 * x, 3 * (2 * x + 1).min(part.width - 1));
+            for (c, value) in pixel.iter_mut().enumerate() {
+                let four = [upper[one + c], upper[two + c], lower[one + c], lower[two + c]];
+                let sum: u32 = four.into_iter().map(Into::into).sum();
+                *value = T::try_from((sum + 2) / 4).unwrap_or(T::DEFAULT_MAX_VALUE);
+            }
+        }
+    });
+    let [width, height] = [width, height].map(|length| u32::try_from(length).unwrap_or(u32::MAX));
+    ImageBuffer::from_raw(width, height, data).unwrap_or_default()
 }
 
 /// A rectangle of a photograph, in its pixels.
@@ -171,41 +184,4 @@ pub struct Part {
     pub width: usize,
     /// Rows.
     pub height: usize,
-}
-
-fn add<T: Copy + Into<f32>>(sums: &mut [[f32; 3]], row: &[T], weight: f32) {
-    for (sum, source) in sums.iter_mut().zip(row.chunks_exact(3)) {
-        for (s, v) in sum.iter_mut().zip(source) {
-            *s += weight * (*v).into();
-        }
-    }
-}
-
-/// Which source pixels, with which weights, make each output pixel along one axis.
-struct Spans {
-    first: usize,
-    step: f64,
-    end: usize,
-}
-
-impl Spans {
-    fn new(first: usize, length: usize, out: usize, size: usize) -> Self {
-        Self { first, step: length as f64 / out.max(1) as f64, end: (first + length).min(size) }
-    }
-
-    fn of(&self, out: usize) -> impl Iterator<Item = (usize, f32)> + use<> {
-        let (low, high) = if self.step >= 1.0 {
-            (out as f64 * self.step, (out + 1) as f64 * self.step)
-        } else {
-            let centre = (out as f64 + 0.5) * self.step;
-            let limit = (self.end - self.first) as f64;
-            ((centre - 0.5).clamp(0.0, limit - 1.0), (centre + 0.5).clamp(1.0, limit))
-        };
-        let (first, end, total) = (self.first, self.end, high - low);
-        let last = pixel(high.ceil() - 1.0, end - first);
-        (pixel(low, end - first)..=last).filter_map(move |k| {
-            let overlap = high.min(k as f64 + 1.0) - low.max(k as f64);
-            (overlap > 0.0).then(|| (first + k, narrow(overlap / total)))
-        })
-    }
 }

@@ -8,8 +8,9 @@
 use super::{
     lattice::hexagonal_neighbourhoods,
     peaks::{self, Peak},
-    photo::{Part, Photo},
+    photo::Part,
     plane::{Plane, pixels},
+    raster::Pyramid,
 };
 use glam::DVec2;
 use rayon::prelude::*;
@@ -62,11 +63,12 @@ pub(crate) struct PitchEstimate {
     pub(crate) coverage: f64,
 }
 
-/// Finds the pitch at which `part` of the photograph looks most like comb; `None` where nothing can be tried.
+/// Finds the pitch at which the photograph looks most like comb; `None` where nothing can be tried.
 #[must_use]
-pub(crate) fn find(photo: &Photo, part: Part, hint: Option<f64>) -> Option<PitchEstimate> {
+pub(crate) fn find(pyramid: &Pyramid<'_>, hint: Option<f64>) -> Option<PitchEstimate> {
+    let levels = levels(pyramid.part(), hint);
     let tried: Vec<PitchEstimate> =
-        levels(part, hint).into_par_iter().flat_map_iter(|pitch| at_level(photo, part, pitch)).collect();
+        levels.into_par_iter().flat_map_iter(|pitch| at_level(pyramid, pitch)).collect();
     let greatest = |among: &mut dyn Iterator<Item = &PitchEstimate>| {
         among.copied().max_by(|a, b| a.coverage.total_cmp(&b.coverage))
     };
@@ -87,18 +89,17 @@ fn levels(part: Part, hint: Option<f64>) -> Vec<f64> {
     pitches
 }
 
-fn at_level(photo: &Photo, part: Part, pitch: f64) -> [PitchEstimate; 2] {
+fn at_level(pyramid: &Pyramid<'_>, pitch: f64) -> [PitchEstimate; 2] {
     let scale = LEVEL_PITCH / pitch;
     let mut found = [Vec::new(), Vec::new()];
     let mut area = 0.0;
-    for tile in tiles(part, scale) {
+    for tile in tiles(pyramid.part(), scale) {
         let size = |length: usize| pixels(length as f64 * scale).max(4);
-        let colours = photo.resampled(tile, size(tile.width), size(tile.height));
-        let grey = colours.grey();
+        let grey = pyramid.raster(tile, size(tile.width), size(tile.height)).grey();
         area += (grey.width() * grey.height()) as f64;
-        for (sign, distances) in [1.0, -1.0].into_iter().zip(&mut found) {
-            distances.extend(neighbour_distances(&grey, sign));
-        }
+        let bright = peaks::band_pass(&grey, LEVEL_PITCH);
+        found[0].extend(neighbour_distances(&bright.map(|v| -v)));
+        found[1].extend(neighbour_distances(&bright));
     }
     let estimate = |polarity, mut distances: Vec<f64>| {
         distances.sort_by(f64::total_cmp);
@@ -110,10 +111,9 @@ fn at_level(photo: &Photo, part: Part, pitch: f64) -> [PitchEstimate; 2] {
     [estimate(Polarity::DarkCells, dark), estimate(Polarity::BrightCells, bright)]
 }
 
-/// Mean neighbour distance of every extremum that sits in a hexagonal neighbourhood.
-fn neighbour_distances(grey: &Plane, sign: f32) -> Vec<f64> {
-    let response = peaks::band_pass(&grey.map(|v| -sign * v), LEVEL_PITCH);
-    let found: Vec<Peak> = peaks::maxima(&response, 0.4);
+/// Mean neighbour distance of every maximum that sits in a hexagonal neighbourhood.
+fn neighbour_distances(response: &Plane) -> Vec<f64> {
+    let found: Vec<Peak> = peaks::maxima(response, 0.4);
     let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
     hexagonal_neighbourhoods(&points, LEVEL_PITCH).iter().flatten().map(|n| n.distance).collect()
 }

@@ -9,6 +9,9 @@ use rayon::prelude::*;
 /// Rows that one task works on; fixed, so that sums are the same for any number of threads.
 const BAND: usize = 128;
 
+/// Rows that are not worth sharing among threads.
+const ROWS_PER_TASK: usize = 16;
+
 /// A raster of `f32`, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Plane {
@@ -76,8 +79,8 @@ impl Plane {
     /// A raster of `f(value)`.
     #[must_use]
     pub(crate) fn map(&self, f: impl Fn(f32) -> f32 + Sync) -> Self {
-        let mut out = self.clone();
-        out.data.par_iter_mut().for_each(|v| *v = f(*v));
+        let mut out = Self::new(self.width, self.height, 0.0);
+        out.fill_rows(|y, row| row.iter_mut().zip(self.row(y)).for_each(|(v, s)| *v = f(*s)));
         out
     }
 
@@ -88,9 +91,19 @@ impl Plane {
     #[must_use]
     pub(crate) fn zip(&self, other: &Self, f: impl Fn(f32, f32) -> f32 + Sync) -> Self {
         assert!(self.width == other.width && self.height == other.height, "planes of different size");
-        let mut out = self.clone();
-        out.data.par_iter_mut().zip(&other.data).for_each(|(a, b)| *a = f(*a, *b));
+        let mut out = Self::new(self.width, self.height, 0.0);
+        out.fill_rows(|y, row| {
+            for ((v, a), b) in row.iter_mut().zip(self.row(y)).zip(other.row(y)) {
+                *v = f(*a, *b);
+            }
+        });
         out
+    }
+
+    /// The values of a row.
+    #[must_use]
+    pub(crate) fn row(&self, y: usize) -> &[f32] {
+        &self.data[y * self.width..(y + 1) * self.width]
     }
 
     /// Gaussian mean of standard deviation `sigma` pixels, over the pixels that exist.
@@ -108,9 +121,20 @@ impl Plane {
         box_radii(sigma).iter().fold(self.clone(), |plane, radius| plane.box_mean(*radius))
     }
 
-    fn fill_rows(&mut self, fill: impl Fn(usize, &mut [f32]) + Sync) {
+    /// Calls `fill` with the number and the values of every row.
+    pub(crate) fn fill_rows(&mut self, fill: impl Fn(usize, &mut [f32]) + Sync) {
+        self.fill_rows_with(|| (), |(), y, row| fill(y, row));
+    }
+
+    /// The same with working space that `space` makes and that rows may share one after the other.
+    pub(crate) fn fill_rows_with<T>(
+        &mut self,
+        space: impl Fn() -> T + Sync + Send,
+        fill: impl Fn(&mut T, usize, &mut [f32]) + Sync,
+    ) {
         let width = self.width.max(1);
-        self.data.par_chunks_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
+        let rows = self.data.par_chunks_mut(width).with_min_len(ROWS_PER_TASK).enumerate();
+        rows.for_each_init(space, |space, (y, row)| fill(space, y, row));
     }
 
     /// Separable convolution with a symmetric kernel given from its centre outward.
@@ -121,9 +145,9 @@ impl Plane {
 
     fn convolved_rows(&self, half: &[f32]) -> Self {
         let (width, reach) = (self.width, half.len() - 1);
-        let mut out = self.clone();
+        let mut out = Self::new(width, self.height, 0.0);
         out.fill_rows(|y, row| {
-            let source = &self.data[y * width..(y + 1) * width];
+            let source = self.row(y);
             for (x, v) in row.iter_mut().enumerate() {
                 if x >= reach && x + reach < width {
                     let window = &source[x - reach..=x + reach];
@@ -161,9 +185,9 @@ impl Plane {
 
     fn box_rows(&self, radius: usize) -> Self {
         let width = self.width;
-        let mut out = self.clone();
+        let mut out = Self::new(width, self.height, 0.0);
         out.fill_rows(|y, row| {
-            let source = &self.data[y * width..(y + 1) * width];
+            let source = self.row(y);
             let mut sum: f64 = source[..radius.min(width)].iter().map(|v| f64::from(*v)).sum();
             for (x, v) in row.iter_mut().enumerate() {
                 if x + radius < width {

@@ -1,17 +1,16 @@
 //! From photograph to cells: the steps in order.
 
 use super::{
-    CorrectionError, Settings, distance,
+    CorrectionError, Settings,
     evidence::{self, Evidence, Rasters},
     kinds::{self, Kind, median},
-    lattice::{self, Layers, PitchField, Site, hexagonal_neighbourhoods},
-    light::{WallColour, levelled},
-    peaks::{self, Peak},
-    photo::{Colours, Part, Photo},
+    lattice::Site,
+    photo::Part,
     pitch::PitchEstimate,
-    plane::{Plane, narrow, pixel, pixels},
+    plane::{Plane, pixel},
+    raster::Pyramid,
     sides::{self, Cells, Count},
-    triangulation::Delaunay,
+    survey::{Survey, survey},
     walls::{self, Region, Wall},
     watershed::{self, Segmentation},
 };
@@ -29,20 +28,17 @@ pub const LEAST_PITCH: f64 = 11.0;
 pub(crate) const LEAST_COVERAGE: f64 = 0.012;
 /// Smoothing of the relief, in pitches.
 const RELIEF_BLUR: f64 = 0.03;
-/// Relief above which a pixel is wall, between the cells' inside (about −0.7) and the walls' crest (about +1.2).
-const WALL_LEVEL: f32 = 0.4;
-/// Height per pitch of distance from the openings that is added to walls, so that thick wax is shared in the middle.
-const WALL_SLOPE: f64 = 10.0;
 
-/// Brightness below which differences are noise, when contrast is taken as a ratio.
-const DARKEST: f32 = 0.02;
-/// Least contrast of a blob as a share of the regular ones' median.
-const LEAST_RATIO: f64 = 0.3;
 /// Two halves of one wide cell: no wall of more than this share of the usual rise between them, together no larger than
 /// this many cells, and nearer than this many pitches. Two cells are 2 in area and 1 in distance.
 const HALVES_RISE: f64 = 0.55;
 const HALVES_AREA: f64 = 1.65;
 const HALVES_DISTANCE: f64 = 0.78;
+/// An inferred place is a corner of another one's cell behind no more than a sunken wall: less than this share of a cell,
+/// no more than this together with the other, and a wall of no more than this share of the usual rise.
+const CORNER_AREA: f64 = 0.5;
+const CORNER_TOTAL: f64 = 1.4;
+const CORNER_RISE: f64 = 0.8;
 
 /// A cell that the border cuts is a sliver if less than this share of its outline is seen.
 const HALF_SEEN: f64 = 0.5;
@@ -92,14 +88,6 @@ impl Reading {
     }
 }
 
-/// Light levelled, blobs found, lattice grown.
-struct Survey {
-    wallness: Plane,
-    relief: Plane,
-    sites: Vec<Site>,
-    field: PitchField,
-}
-
 /// Factor from the photograph to the working raster.
 fn scale_for(pitch: f64) -> f64 {
     if pitch > WORK_PITCH {
@@ -113,20 +101,14 @@ fn scale_for(pitch: f64) -> f64 {
 
 /// Reads the cells of a part of a photograph, whose pitch is known.
 pub(crate) fn read(
-    photo: &Photo,
-    part: Part,
+    pyramid: &Pyramid<'_>,
     estimate: PitchEstimate,
     settings: &Settings,
 ) -> Result<Reading, CorrectionError> {
     let scale = scale_for(estimate.pitch);
     let pitch = estimate.pitch * scale;
-    let sign = estimate.polarity.wall_sign();
-    let colours =
-        photo.resampled(part, pixels(part.width as f64 * scale), pixels(part.height as f64 * scale));
-    let brightness = WallColour::brightness(estimate.polarity);
-    let first = survey(&colours, brightness, sign, pitch, Layers::Seen);
-    let colour = learned_colour(&colours, &first, pitch).unwrap_or(brightness);
-    let mut survey = survey(&colours, colour, sign, pitch, Layers::Inferred);
+    let part = pyramid.part();
+    let mut survey = survey(pyramid, estimate.polarity, scale, pitch);
     let origin = DVec2::new(part.left as f64, part.top as f64);
     let to_raster = |point: DVec2| (point - origin) * scale;
     settings.corrections.place(&mut survey.sites, to_raster, pitch)?;
@@ -156,52 +138,6 @@ fn hidden(settings: &Settings, raster: &Plane, part: Part, scale: f64) -> Option
     Some((0..width * raster.height()).map(|i| hides(i % width, i / width)).collect())
 }
 
-/// Drops blobs whose contrast, as a ratio of brightness, is far below that of the regular ones: levelling the light also
-/// levels up the texture of caps and of the ground.
-fn clear(found: Vec<Peak>, colours: &Colours, sign: f32, pitch: f64) -> Vec<Peak> {
-    let ratio = peaks::difference(&colours.grey().map(|v| -sign * (v + DARKEST).ln()), pitch);
-    let contrast = |p: &Peak| f64::from(ratio.sample(p.position.x, p.position.y));
-    let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
-    let regular = hexagonal_neighbourhoods(&points, pitch);
-    let typical = median(found.iter().zip(&regular).filter(|(_, n)| n.is_some()).map(|(p, _)| contrast(p)));
-    found.into_iter().filter(|p| contrast(p) > LEAST_RATIO * typical).collect()
-}
-
-fn survey(colours: &Colours, colour: WallColour, sign: f32, pitch: f64, layers: Layers) -> Survey {
-    let wallness = colour.of(colours);
-    let relief = levelled(&wallness, pitch);
-    let response = peaks::band_pass(&relief.map(|v| -v), pitch);
-    let found =
-        clear(peaks::thinned(peaks::maxima(&response, 0.15), |_| 0.5 * pitch, pitch), colours, sign, pitch);
-    let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
-    let regular = hexagonal_neighbourhoods(&points, pitch);
-    let measured: Vec<(DVec2, f64)> =
-        regular.iter().zip(&points).filter_map(|(n, p)| n.map(|n| (*p, n.distance))).collect();
-    let size = DVec2::new(wallness.width() as f64, wallness.height() as f64);
-    let field = PitchField::new(size, pitch, &measured);
-    let seeds: Vec<bool> = regular.iter().zip(&found).map(|(n, p)| n.is_some() && p.strength > 0.4).collect();
-    let sites = lattice::grow(&found, &field, &seeds, size, layers);
-    Survey { wallness, relief, sites, field }
-}
-
-/// The wall colour, from the highest points between neighbouring cells against the cells' middles.
-fn learned_colour(colours: &Colours, survey: &Survey, pitch: f64) -> Option<WallColour> {
-    let seen: Vec<DVec2> = survey.sites.iter().filter(|s| s.depth == 0).map(|s| s.position).collect();
-    let crest = |a: DVec2, b: DVec2| {
-        (0..9)
-            .map(|k| a.lerp(b, 0.3 + 0.05 * f64::from(k)))
-            .max_by(|p, q| survey.relief.sample(p.x, p.y).total_cmp(&survey.relief.sample(q.x, q.y)))
-    };
-    let walls: Vec<DVec2> = Delaunay::of(&seen)
-        .edges
-        .iter()
-        .map(|edge| (seen[edge.ends.0], seen[edge.ends.1]))
-        .filter(|(a, b)| a.distance(*b) < 1.3 * pitch)
-        .filter_map(|(a, b)| crest(a, b))
-        .collect();
-    WallColour::learned(colours, &walls, &seen)
-}
-
 struct Segmented {
     segmentation: Segmentation,
     relief: Plane,
@@ -215,20 +151,18 @@ struct Segmented {
 
 fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usize, usize)]) -> Segmented {
     let relief = survey.relief.blurred(RELIEF_BLUR * pitch);
-    let thickness = distance::to_nearest(&relief, |v| v < WALL_LEVEL);
-    let slope = narrow(WALL_SLOPE / pitch);
-    let heights = relief.zip(&thickness, |r, d| r.min(WALL_LEVEL) + slope * d);
     let mut centres: Vec<DVec2> = survey.sites.iter().map(|s| s.position).collect();
     let pitches: Vec<f64> = centres.iter().map(|c| survey.field.at(*c)).collect();
-    let first = watershed::flood(&heights, &centres, &pitches, hidden);
-    let regions = walls::regions(&first, &relief, &centres, &pitches);
+    let first = watershed::flood(&relief, &centres, &pitches, hidden);
+    let reaches: Vec<f64> = pitches.iter().map(|p| watershed::REACH * p).collect();
+    let regions = walls::regions(&first, &relief, &centres, &pitches, &reaches);
     for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
-        if site.depth == 0 && region.area > 0.0 && region.on_border == 0 {
+        if site.depth == 0 && region.area > 0.0 && !region.on_border {
             *centre = region.centroid;
         }
     }
-    let mut segmentation = watershed::flood(&heights, &centres, &pitches, hidden);
-    let regions = walls::regions(&segmentation, &relief, &centres, &pitches);
+    let mut segmentation = watershed::flood(&relief, &centres, &pitches, hidden);
+    let regions = walls::regions(&segmentation, &relief, &centres, &pitches, &reaches);
     let walls = walls::walls(&segmentation, &relief, &regions);
     let mut into = halves(&survey.sites, &regions, &walls, &pitches);
     for (a, b) in joined {
@@ -244,37 +178,59 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let markers: Vec<DVec2> = kept.iter().map(|i| centres[*i]).collect();
     let by_hand =
         kept.iter().map(|i| survey.sites[*i].by_hand || joined.iter().any(|(a, _)| a == i)).collect();
-    let regions = walls::regions(&segmentation, &relief, &markers, &pitches);
+    let mut reaches = vec![0.0; kept.len()];
+    for (old, centre) in centres.iter().enumerate() {
+        let new = place[into[old]];
+        let reach = centre.distance(markers[new]) + watershed::REACH * survey.field.at(*centre);
+        reaches[new] = f64::max(reaches[new], reach);
+    }
+    let regions = walls::regions(&segmentation, &relief, &markers, &pitches, &reaches);
     let walls = walls::walls(&segmentation, &relief, &regions);
     let centres = regions
         .iter()
         .zip(&markers)
-        .map(|(r, m)| if r.area > 0.0 && r.on_border == 0 { r.centroid } else { *m })
+        .map(|(r, m)| if r.area > 0.0 && !r.on_border { r.centroid } else { *m })
         .collect();
     Segmented { segmentation, relief, centres, markers, by_hand, pitches, regions, walls }
 }
 
-/// Cells that were found as two halves, having no wall between them: for each, the one that it joins.
+/// Cells that were found as two halves, having no wall between them: for each, the one that it joins. Two blobs may be
+/// halves, and a blob and an inferred place that got only a corner of the blob's cell.
 fn halves(
     sites: &[Site],
     regions: &[Region],
     walls: &BTreeMap<(usize, usize), Wall>,
     pitches: &[f64],
 ) -> Vec<usize> {
-    let rise = |(a, b): (usize, usize), w: &Wall| w.height - regions[a].inside.max(regions[b].inside);
     let found = |i: usize| sites[i].depth == 0 && !sites[i].by_hand;
+    // An inferred place may lie on a cap: only what was found tells how low an opening is.
+    let inside = |i: usize| if found(i) { regions[i].inside } else { f64::NEG_INFINITY };
+    let rise = |(a, b): (usize, usize), w: &Wall| w.height - inside(a).max(inside(b));
     let seen = |(a, b): (usize, usize)| found(a) && found(b);
     let typical = median(walls.iter().filter(|(p, _)| seen(**p)).map(|(p, w)| rise(*p, w)));
     let mut into: Vec<usize> = (0..sites.len()).collect();
+    let mut joined = vec![false; sites.len()];
     for (pair, wall) in walls {
         let (a, b) = *pair;
         let pitch = (pitches[a] + pitches[b]) / 2.0;
-        let open = rise(*pair, wall) < HALVES_RISE * typical && wall.length > 0.3 * pitch;
-        let sized = regions[a].area + regions[b].area < HALVES_AREA * pitch * pitch * 0.75_f64.sqrt();
+        let cell = pitch * pitch * 0.75_f64.sqrt();
+        let corner =
+            |i: usize| sites[i].depth > 0 && regions[i].area < CORNER_AREA * cell && !regions[i].on_border;
+        let halves = match (found(a), found(b)) {
+            (true, true) => wall.length > 0.3 * pitch,
+            (true, false) => corner(b),
+            (false, true) => corner(a),
+            (false, false) => false,
+        };
+        let both = found(a) && found(b);
+        let (rise_limit, area) = if both { (HALVES_RISE, HALVES_AREA) } else { (CORNER_RISE, CORNER_TOTAL) };
+        let open = rise(*pair, wall) < rise_limit * typical;
+        let sized = regions[a].area + regions[b].area < area * cell;
         let close = regions[a].centroid.distance(regions[b].centroid) < HALVES_DISTANCE * pitch;
-        let free = into[a] == a && into[b] == b && into.iter().filter(|i| **i == a).count() == 1;
-        if seen(*pair) && open && sized && close && free {
-            into[b] = a;
+        if halves && open && sized && close && !joined[a] && !joined[b] {
+            let (kept, gone) = if found(a) { (a, b) } else { (b, a) };
+            into[gone] = kept;
+            (joined[a], joined[b]) = (true, true);
         }
     }
     into
@@ -289,7 +245,7 @@ fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
     let cut: Vec<bool> = regions
         .iter()
         .zip(&evidence)
-        .map(|(r, e)| r.area == 0.0 || (r.on_border > 0 && e.visible < 1.0) || r.on_nothing > 0)
+        .map(|(r, e)| r.area == 0.0 || (r.on_border && e.visible < 1.0) || r.on_nothing)
         .collect();
     let whole: Vec<bool> = cut.iter().map(|c| !c).collect();
     let mut kinds = kinds::classify(&centres, &pitches, &evidence, &whole);

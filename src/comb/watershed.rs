@@ -2,18 +2,29 @@
 //!
 //! After Meyer's flooding: pixels are visited in order of the height at which the flood reaches them, first come first
 //! served among equals, so that a flat top is shared in the middle. Heights are quantised, which makes the queue a row of
-//! buckets and the result independent of anything but the input.
+//! buckets. The raster is flooded in tiles that overlap by more than a cell's reach; their number follows from the raster
+//! alone, so that the result is the same for any number of threads.
 
-use super::plane::{Plane, pixel};
+use super::{
+    kinds::median,
+    plane::{Plane, pixel, pixels},
+    terrain::{self, LEVELS, Tile},
+};
 use glam::DVec2;
-use std::collections::VecDeque;
+use rayon::prelude::*;
+use std::ops::Range;
 
-/// Heights that are told apart.
-const LEVELS: usize = 512;
 /// Radius of a marker, in pitches: inside any cell, and wide enough to cover a glint at its centre.
 const MARKER_RADIUS: f64 = 0.16;
 /// A cell ends this far from its marker, in pitches: corners of a regular cell are at 0.58.
-const REACH: f64 = 0.95;
+pub(crate) const REACH: f64 = 0.95;
+/// Longest edge of a tile in pixels, without its margin: such a tile stays in a processor's cache.
+const TILE: usize = 448;
+/// Overlap of tiles, in pitches: the reach of a cell and the radius of a marker.
+const MARGIN: f64 = 1.2;
+/// A pixel that nothing has flooded yet, and one that nothing can flood.
+const DRY: u16 = u16::MAX - 1;
+const BARRIER: u16 = u16::MAX;
 
 /// Which cell each pixel belongs to.
 #[derive(Clone, Debug)]
@@ -52,6 +63,18 @@ impl Segmentation {
         }
     }
 
+    /// Which of the `columns` of row `y` have a label.
+    pub(crate) fn places(
+        &self,
+        label: u32,
+        y: usize,
+        columns: Range<usize>,
+    ) -> impl Iterator<Item = usize> + use<'_> {
+        let first = columns.start;
+        let row = &self.labels[y * self.width..(y + 1) * self.width][columns];
+        row.iter().enumerate().filter(move |(_, l)| **l == label).map(move |(x, _)| first + x)
+    }
+
     /// The label of a pixel.
     pub(crate) fn at(&self, x: usize, y: usize) -> u32 {
         self.labels[y * self.width + x]
@@ -67,48 +90,141 @@ pub(crate) fn flood(
     hidden: Option<&[bool]>,
 ) -> Segmentation {
     let (width, height) = (relief.width(), relief.height());
-    let levels = quantised(relief);
-    let is_hidden = |index: usize| hidden.is_some_and(|h| h[index]);
     let mut labels = vec![Segmentation::NONE; width * height];
-    let mut buckets: Vec<VecDeque<usize>> = vec![VecDeque::new(); LEVELS];
-    for (label, (centre, pitch)) in markers.iter().zip(pitches).enumerate() {
-        for index in disc(*centre, MARKER_RADIUS * pitch, width, height) {
-            if labels[index] == Segmentation::NONE && !is_hidden(index) {
-                labels[index] = crate::index::checked_u32(label);
-                buckets[0].push_back(index);
+    let margin = pixels(MARGIN * pitches.iter().copied().fold(0.0, f64::max));
+    let ground = Ground { relief, markers, pitches, hidden, pitch: median(pitches.iter().copied()).max(1.0) };
+    let (columns, rows) = (cores(width), cores(height));
+    let mut rest = labels.as_mut_slice();
+    let mut bands = Vec::with_capacity(rows.len());
+    for rows in rows {
+        let (band, after) = rest.split_at_mut(rows.len() * width);
+        bands.push((rows, band));
+        rest = after;
+    }
+    bands.into_par_iter().for_each(|(rows, band)| {
+        let floods: Vec<(Range<usize>, Tile, Vec<u32>)> = columns
+            .clone()
+            .into_par_iter()
+            .map(|core| {
+                let tile =
+                    Tile { columns: widened(&core, margin, width), rows: widened(&rows, margin, height) };
+                let labels = ground.flood(&tile);
+                (core, tile, labels)
+            })
+            .collect();
+        for (core, tile, labels) in floods {
+            for y in rows.clone() {
+                let from = (y - tile.rows.start + 1) * (tile.columns.len() + 2) + core.start
+                    - tile.columns.start
+                    + 1;
+                let to = (y - rows.start) * width;
+                band[to + core.start..to + core.end].copy_from_slice(&labels[from..from + core.len()]);
             }
         }
-    }
-    let mut level = 0;
-    while level < LEVELS {
-        let Some(index) = buckets[level].pop_front() else {
-            level += 1;
-            continue;
-        };
-        let label = labels[index];
-        let centre = markers[label as usize];
-        let reach = REACH * pitches[label as usize];
-        for next in beside(index, width, height) {
-            let place = DVec2::new((next % width) as f64 + 0.5, (next / width) as f64 + 0.5);
-            let free = labels[next] == Segmentation::NONE && !is_hidden(next);
-            if free && place.distance_squared(centre) < reach * reach {
-                labels[next] = label;
-                buckets[usize::from(levels[next]).max(level)].push_back(next);
-            }
-        }
-    }
+    });
     Segmentation { width, height, labels }
 }
 
-fn quantised(relief: &Plane) -> Vec<u16> {
-    let (low, high) = relief
-        .data()
-        .iter()
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-    let range = f64::from(high - low).max(1e-12);
-    let top = (LEVELS - 1) as f64;
-    let level = |v: &f32| u16::try_from(pixel(f64::from(v - low) / range * top, LEVELS)).unwrap_or(0);
-    relief.data().iter().map(level).collect()
+/// A length in parts of nearly the same size, none longer than [`TILE`].
+fn cores(length: usize) -> Vec<Range<usize>> {
+    let count = length.div_ceil(TILE).max(1);
+    (0..count).map(|k| k * length / count..(k + 1) * length / count).collect()
+}
+
+fn widened(range: &Range<usize>, margin: usize, size: usize) -> Range<usize> {
+    range.start.saturating_sub(margin)..(range.end + margin).min(size)
+}
+
+struct Ground<'a> {
+    relief: &'a Plane,
+    markers: &'a [DVec2],
+    pitches: &'a [f64],
+    hidden: Option<&'a [bool]>,
+    pitch: f64,
+}
+
+/// A marker that reaches into a tile, in pixels of the tile with its frame.
+struct Source {
+    label: u32,
+    centre: DVec2,
+    squared_reach: f64,
+}
+
+/// A pixel of a tile with its frame: column and row.
+type Pixel = [u16; 2];
+
+impl Ground<'_> {
+    /// Labels of a tile's pixels with a frame of one pixel around them; hidden pixels and the frame are
+    /// [`Segmentation::NONE`].
+    fn flood(&self, tile: &Tile) -> Vec<u32> {
+        let stride = tile.columns.len() + 2;
+        let levels = terrain::levels(self.relief, tile, self.pitch);
+        let mut owners = self.dry(tile);
+        let mut buckets: Vec<Vec<Pixel>> = vec![Vec::new(); LEVELS];
+        let sources = self.mark(tile, &mut owners, &mut buckets[0]);
+        for level in 0..LEVELS {
+            let mut next = 0;
+            while let Some(&[x, y]) = buckets[level].get(next) {
+                next += 1;
+                let owner = owners[usize::from(y) * stride + usize::from(x)];
+                let source = &sources[usize::from(owner)];
+                for [x, y] in [[x, y - 1], [x - 1, y], [x + 1, y], [x, y + 1]] {
+                    let beside = usize::from(y) * stride + usize::from(x);
+                    if owners[beside] != DRY {
+                        continue;
+                    }
+                    let place = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    if place.distance_squared(source.centre) < source.squared_reach {
+                        owners[beside] = owner;
+                        buckets[usize::from(levels[beside]).max(level)].push([x, y]);
+                    }
+                }
+            }
+            buckets[level] = Vec::new();
+        }
+        let label = |owner: &u16| sources.get(usize::from(*owner)).map_or(Segmentation::NONE, |s| s.label);
+        owners.iter().map(label).collect()
+    }
+
+    /// A tile that nothing has flooded yet, in a frame that nothing can flood.
+    fn dry(&self, tile: &Tile) -> Vec<u16> {
+        let stride = tile.columns.len() + 2;
+        let mut owners = vec![BARRIER; stride * (tile.rows.len() + 2)];
+        for (y, row) in tile.rows.clone().zip(owners.chunks_mut(stride).skip(1)) {
+            for (x, owner) in tile.columns.clone().zip(&mut row[1..]) {
+                if !self.hidden.is_some_and(|h| h[y * self.relief.width() + x]) {
+                    *owner = DRY;
+                }
+            }
+        }
+        owners
+    }
+
+    /// Gives the discs of the markers that reach into a tile to them, and lists the discs' pixels.
+    fn mark(&self, tile: &Tile, owners: &mut [u16], wet: &mut Vec<Pixel>) -> Vec<Source> {
+        let (width, height) = (tile.columns.len(), tile.rows.len());
+        let corner = DVec2::new(tile.columns.start as f64, tile.rows.start as f64);
+        let limit = DVec2::new(width as f64, height as f64);
+        let mut sources = Vec::new();
+        for (label, (centre, pitch)) in self.markers.iter().zip(self.pitches).enumerate() {
+            let (at, radius) = (*centre - corner, MARKER_RADIUS * pitch);
+            if at.cmplt(DVec2::splat(-radius)).any() || at.cmpgt(limit + radius).any() {
+                continue;
+            }
+            let owner = u16::try_from(sources.len()).unwrap_or(BARRIER);
+            let label = crate::index::checked_u32(label);
+            sources.push(Source { label, centre: at + 1.0, squared_reach: (REACH * pitch).powi(2) });
+            for index in disc(at, radius, width, height) {
+                let (x, y) = (index % width + 1, index / width + 1);
+                let place = y * (width + 2) + x;
+                if owners[place] == DRY {
+                    owners[place] = owner;
+                    wet.extend(u16::try_from(x).ok().zip(u16::try_from(y).ok()).map(|(x, y)| [x, y]));
+                }
+            }
+        }
+        sources
+    }
 }
 
 /// Pixels within `radius` of `centre`; of a centre outside the raster, those that are inside.
@@ -120,14 +236,4 @@ pub(crate) fn disc(centre: DVec2, radius: f64, width: usize, height: usize) -> i
             (place.distance_squared(centre) <= radius * radius).then_some(y * width + x)
         })
     })
-}
-
-/// The four pixels beside a pixel.
-fn beside(index: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
-    let (x, y) = (index % width, index / width);
-    let left = (x > 0).then(|| index - 1);
-    let right = (x + 1 < width).then(|| index + 1);
-    let up = (y > 0).then(|| index - width);
-    let down = (y + 1 < height).then(|| index + width);
-    [up, left, right, down].into_iter().flatten()
 }

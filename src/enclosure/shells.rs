@@ -98,7 +98,8 @@ pub fn shells(design: &Design) -> Result<[Shell; 2], BuildError> {
                 let back = if side == WallSide::Lower { -wall } else { wall };
                 shell_from_level(surface.as_ref(), level, Move::Offset(back), &grid, side)
             };
-            Ok([shell(WallSide::Lower)?, shell(WallSide::Upper)?])
+            let (lower, upper) = rayon::join(|| shell(WallSide::Lower), || shell(WallSide::Upper));
+            Ok([lower?, upper?])
         }
     }
 }

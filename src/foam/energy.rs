@@ -6,7 +6,7 @@
 //! `E − p_b V_b − p_f V_f` of a film between the regions *b* (back) and *f* (front):
 //! `∫ γ|N| − r·N` with `N = a × b` and `r = (p_b − p_f)(x)/3 − (p_b o_b − p_f o_f)/3`, where `o` are the regions' origins.
 
-use super::complex::{Complex, Places, Shape, ShapePoint};
+use super::complex::{Complex, MOST_NODES, Places, Shape, ShapePoint};
 use glam::{DMat3, DVec3};
 
 /// The matrix of `x ↦ v × x`.
@@ -119,7 +119,7 @@ pub(crate) fn add_element(
     hessian: Option<&mut Blocks>,
 ) -> f64 {
     let mut energy = 0.0;
-    let mut hessian = hessian;
+    let mut lower = [[DMat3::ZERO; MOST_NODES]; MOST_NODES];
     for point in shape.points() {
         let (x, a, b) = jet(point, nodes);
         let normal = a.cross(b);
@@ -132,7 +132,9 @@ pub(crate) fn add_element(
         for (i, &row) in local.iter().enumerate() {
             gradient[row] += point.weight * (point.value[i] * gx + point.du[i] * ga + point.dv[i] * gb);
         }
-        let Some(hessian) = hessian.as_deref_mut() else { continue };
+        if hessian.is_none() {
+            continue;
+        }
         let (na, nb) = (-cross_matrix(b), cross_matrix(a));
         let flat = (loads.tension / length) * (DMat3::IDENTITY - outer(unit, unit));
         let (ta, tb) = (na.transpose() * flat, nb.transpose() * flat);
@@ -143,7 +145,16 @@ pub(crate) fn add_element(
             xa: -third * na,
             xb: -third * nb,
         };
-        second.scatter(point, local, hessian);
+        second.scatter(point, nodes.len(), &mut lower);
+    }
+    if let Some(hessian) = hessian {
+        for (j, &column) in local.iter().enumerate() {
+            hessian.add(column, column, lower[j][j]);
+            for (i, &row) in local.iter().enumerate().skip(j + 1) {
+                hessian.add(row, column, lower[j][i]);
+                hessian.add(column, row, lower[j][i].transpose());
+            }
+        }
     }
     energy
 }
@@ -158,16 +169,17 @@ struct Second {
 }
 
 impl Second {
-    fn scatter(&self, point: &ShapePoint, local: &[usize], hessian: &mut Blocks) {
+    /// Adds the blocks on and below the diagonal, column by column.
+    fn scatter(&self, point: &ShapePoint, count: usize, lower: &mut [[DMat3; MOST_NODES]; MOST_NODES]) {
         let (ba, ax, bx) = (self.ab.transpose(), self.xa.transpose(), self.xb.transpose());
-        for (j, &column) in local.iter().enumerate() {
+        for (j, column) in lower.iter_mut().enumerate().take(count) {
             let (n, u, v) =
                 (point.weight * point.value[j], point.weight * point.du[j], point.weight * point.dv[j]);
             let x = u * self.xa + v * self.xb;
             let a = n * ax + u * self.aa + v * self.ab;
             let b = n * bx + u * ba + v * self.bb;
-            for (i, &row) in local.iter().enumerate() {
-                hessian.add(row, column, point.value[i] * x + point.du[i] * a + point.dv[i] * b);
+            for (i, block) in column.iter_mut().enumerate().take(count).skip(j) {
+                *block += point.value[i] * x + point.du[i] * a + point.dv[i] * b;
             }
         }
     }

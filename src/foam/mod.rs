@@ -13,7 +13,8 @@
 //! | energy and volumes with exact derivatives | `energy.rs`, `volume/` |
 //! | Newton steps on the constrained system | `solve/` |
 //! | when a film has shrunk: T1 by geometry | `topology.rs` |
-//! | the whole descent, and its state as data | `relax/` |
+//! | the descent of any film complex; the whole run with its T1s, and its state as data | `relax/` |
+//! | pressures against sides and curvature, cell by cell | `audit.rs` |
 //! | who touches whom, for the comparison with combs | `pattern.rs` |
 //! | one bubble, held or free, and the landscape of its energy | `bubble/` |
 //! | foams of two layers, as in natural comb | `layers/` |
@@ -25,6 +26,7 @@
 //! Sources: K. A. Brakke, "The Surface Evolver", Experimental Mathematics 1 (1992), for films as minimised energies;
 //! J. Nocedal and S. Wright, "Numerical Optimization" (2006), for Newton steps under constraints and inertia.
 
+pub mod audit;
 pub mod bubble;
 pub mod complex;
 pub mod energy;

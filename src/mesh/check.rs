@@ -3,6 +3,8 @@
 use super::{TriMesh, VertexId};
 use crate::index::Id;
 use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// One defect of a mesh, with the vertices that show it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,13 +39,7 @@ pub(super) struct BorderEdge {
     pub(super) to: VertexId,
 }
 
-/// No opposite half-edge: the border.
-const NONE: u32 = u32::MAX;
-
-/// A half-edge of an edge that does not pair up.
-const BAD: u32 = u32::MAX - 1;
-
-/// All defects of a mesh that should be closed; open edges among them. Also its border edges, in order of their triangles.
+/// All defects of a mesh that should be closed; open edges among them. Also its border edges, in order of their first ends.
 pub(super) fn inspect(mesh: &TriMesh) -> (Vec<MeshDefect>, Vec<BorderEdge>) {
     let (mut defects, border) = inspect_open(mesh);
     defects.extend(border.iter().map(|edge| MeshDefect::OpenEdge(edge.from, edge.to)));
@@ -51,161 +47,176 @@ pub(super) fn inspect(mesh: &TriMesh) -> (Vec<MeshDefect>, Vec<BorderEdge>) {
 }
 
 /// All defects of a mesh that may have a border, and its border.
+///
+/// A mesh is a manifold if the link of every vertex, the opposite sides of its triangles, is one circle or one path; each
+/// link needs nothing but the triangles of its vertex, so they are looked at in parallel.
 pub(super) fn inspect_open(mesh: &TriMesh) -> (Vec<MeshDefect>, Vec<BorderEdge>) {
-    let mut defects = bad_elements(mesh);
+    let defects = bad_elements(mesh);
     if !defects.is_empty() {
         return (defects, Vec::new());
     }
-    let opposites = pair_half_edges(mesh, &mut defects);
-    if defects.is_empty() {
-        find_doubles(mesh, &opposites, &mut defects);
-        find_pinches(mesh, &opposites, &mut defects);
-    }
-    let border = opposites
-        .iter()
-        .enumerate()
-        .filter(|&(_, &opposite)| opposite == NONE)
-        .map(|(half_edge, _)| {
-            let (from, to) = ends(mesh, half_edge);
-            BorderEdge { from, to }
+    let links = Links::new(mesh);
+    let found: Vec<Found> = (0..mesh.positions.len().div_ceil(LINKS_AT_A_TIME))
+        .into_par_iter()
+        .map(|part| {
+            let first = part * LINKS_AT_A_TIME;
+            let last = (first + LINKS_AT_A_TIME).min(mesh.positions.len());
+            let mut found = Found::default();
+            (first..last).for_each(|vertex| links.inspect(VertexId::from_index(vertex), mesh, &mut found));
+            found
         })
         .collect();
+    let (mut defects, mut border) = (Vec::new(), Vec::new());
+    for part in found {
+        defects.extend(part.defects);
+        border.extend(part.border);
+    }
     (defects, border)
 }
 
+/// Vertices whose links are looked at by one thread in a row: enough to make starting it cheap.
+const LINKS_AT_A_TIME: usize = 1 << 14;
+
 /// Places that are not finite, corners that do not exist, triangles without area.
 fn bad_elements(mesh: &TriMesh) -> Vec<MeshDefect> {
-    let mut defects: Vec<MeshDefect> = mesh
-        .positions
-        .enumerated()
-        .filter(|(_, p)| !p.is_finite())
-        .map(|(vertex, _)| MeshDefect::NotFinite(vertex))
-        .collect();
     let count = mesh.positions.len();
-    for (index, triangle) in mesh.triangles.iter().enumerate() {
+    let places = mesh.positions.as_slice().par_iter().enumerate();
+    let far = places
+        .filter(|(_, p)| !p.is_finite())
+        .map(|(vertex, _)| MeshDefect::NotFinite(VertexId::from_index(vertex)));
+    let mut defects: Vec<MeshDefect> = far.collect();
+    let flat = mesh.triangles.par_iter().enumerate().filter_map(|(index, triangle)| {
         if triangle.iter().any(|vertex| vertex.index() >= count) {
-            defects.push(MeshDefect::NoSuchVertex(index));
-            continue;
+            return Some(MeshDefect::NoSuchVertex(index));
         }
-        let [a, b, c] = mesh.corners(*triangle);
-        if (b - a).cross(c - a) == DVec3::ZERO {
-            defects.push(MeshDefect::Degenerate(index));
-        }
-    }
+        has_no_area(mesh.corners(*triangle)).then_some(MeshDefect::Degenerate(index))
+    });
+    defects.par_extend(flat);
     defects
 }
 
-/// The ends of a half-edge: the `half_edge % 3`-th side of triangle `half_edge / 3`.
-fn ends(mesh: &TriMesh, half_edge: usize) -> (VertexId, VertexId) {
-    let triangle = mesh.triangles[half_edge / 3];
-    (triangle[half_edge % 3], triangle[(half_edge + 1) % 3])
+/// Whether a triangle with these corners has no area, or a repeated corner.
+pub(super) fn has_no_area([a, b, c]: [DVec3; 3]) -> bool {
+    (b - a).cross(c - a) == DVec3::ZERO
 }
 
-/// The opposite of each half-edge, or [`NONE`]; edges that do not pair up are reported.
-///
-/// Half-edges are sorted into buckets by their lower end, then matched within each: linear in time.
-fn pair_half_edges(mesh: &TriMesh, defects: &mut Vec<MeshDefect>) -> Vec<u32> {
-    let count = 3 * mesh.triangles.len();
-    let lower = |half_edge: usize| {
-        let (from, to) = ends(mesh, half_edge);
-        from.min(to).index()
-    };
-    let mut starts = vec![0_u32; mesh.positions.len() + 1];
-    for half_edge in 0..count {
-        starts[lower(half_edge) + 1] += 1;
-    }
-    for i in 1..starts.len() {
-        starts[i] += starts[i - 1];
-    }
-    let mut next = starts.clone();
-    let mut bucketed = vec![0_u32; count];
-    for half_edge in 0..count {
-        let slot = &mut next[lower(half_edge)];
-        bucketed[*slot as usize] = crate::index::checked_u32(half_edge);
-        *slot += 1;
-    }
-    let mut opposites = vec![NONE; count];
-    for window in starts.windows(2) {
-        match_bucket(mesh, &bucketed[window[0] as usize..window[1] as usize], &mut opposites, defects);
-    }
-    opposites
+/// The corners of all triangles, by vertex.
+struct Links {
+    /// Where each vertex's corners start, and the end of the last's.
+    starts: Vec<u32>,
+    /// For each corner, the two others of its triangle, counter-clockwise.
+    others: Vec<[VertexId; 2]>,
 }
 
-/// Pairs the half-edges of one bucket: those with the same ends, one in each direction.
-fn match_bucket(mesh: &TriMesh, bucket: &[u32], opposites: &mut [u32], defects: &mut Vec<MeshDefect>) {
-    for (place, &one) in bucket.iter().enumerate() {
-        let (from, to) = ends(mesh, one as usize);
-        let same = |&&other: &&u32| {
-            let (f, t) = ends(mesh, other as usize);
-            (f, t) == (from, to) || (f, t) == (to, from)
-        };
-        // The first of an edge's half-edges speaks for all of them.
-        if bucket[..place].iter().any(|other| same(&other)) {
-            continue;
-        }
-        let there = bucket.iter().filter(same).filter(|&&other| ends(mesh, other as usize).0 == from).count();
-        let back = bucket.iter().filter(same).count() - there;
-        match (there, back) {
-            (1, 1) => {
-                if let Some(&other) = bucket[place + 1..].iter().find(|other| same(other)) {
-                    opposites[one as usize] = other;
-                    opposites[other as usize] = one;
-                }
-            }
-            (1, 0) => {}
-            _ => {
-                bucket.iter().filter(same).for_each(|&other| opposites[other as usize] = BAD);
-                defects.push(MeshDefect::BadEdge(from, to, there, back));
-            }
-        }
-    }
+/// What was found at some vertices.
+#[derive(Default)]
+struct Found {
+    defects: Vec<MeshDefect>,
+    border: Vec<BorderEdge>,
 }
 
-/// Neighbouring triangles with the same three corners: closed, but without volume.
-fn find_doubles(mesh: &TriMesh, opposites: &[u32], defects: &mut Vec<MeshDefect>) {
-    let apex = |half_edge: usize| mesh.triangles[half_edge / 3][(half_edge % 3 + 2) % 3];
-    for (one, &other) in opposites.iter().enumerate() {
-        let (mine, its) = (one / 3, other as usize / 3);
-        if other != NONE && mine < its && apex(one) == apex(other as usize) {
-            let double = MeshDefect::Doubled(mine, its);
-            if !defects.contains(&double) {
-                defects.push(double);
+impl Links {
+    /// Corners are counted, then put in their places: linear in time.
+    fn new(mesh: &TriMesh) -> Self {
+        let count = mesh.positions.len();
+        let mut starts = vec![0_u32; count + 1];
+        for vertex in mesh.triangles.iter().flatten() {
+            starts[vertex.index()] += 1;
+        }
+        // Each start is set to the end of its corners and comes back while they are filled in from there.
+        let mut sum = 0_u32;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        let nobody = VertexId::from_index(0);
+        let mut others = vec![[nobody; 2]; 3 * mesh.triangles.len()];
+        for &[a, b, c] in mesh.triangles.iter().rev() {
+            for (vertex, pair) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
+                let start = &mut starts[vertex.index()];
+                *start -= 1;
+                others[*start as usize] = pair;
             }
         }
+        Self { starts, others }
+    }
+
+    /// The link of a vertex: directed from the first to the second of each corner's others.
+    fn of(&self, vertex: VertexId) -> &[[VertexId; 2]] {
+        let at = vertex.index();
+        &self.others[self.starts[at] as usize..self.starts[at + 1] as usize]
+    }
+
+    /// What is wrong at one vertex, and the border edge that leaves it. Edges that do not pair up are told by their lower end.
+    fn inspect(&self, vertex: VertexId, mesh: &TriMesh, found: &mut Found) {
+        let link = self.of(vertex);
+        if is_circle(link) {
+            if link.len() == 2 {
+                found.defects.extend(doubled(mesh, vertex, link[0]));
+            }
+            return;
+        }
+        let bad = bad_edges(vertex, link);
+        if !bad.is_empty() {
+            found.defects.extend(bad.into_iter().filter(|&(end, _)| vertex < end).map(|(_, defect)| defect));
+            return;
+        }
+        if !is_path_or_empty(link) {
+            found.defects.push(MeshDefect::PinchedVertex(vertex));
+        }
+        found.border.extend(path_starts(link).map(|side| BorderEdge { from: vertex, to: side[0] }));
     }
 }
 
-/// Vertices whose triangles form more than one fan: turning round from one corner must visit all of them.
-fn find_pinches(mesh: &TriMesh, opposites: &[u32], defects: &mut Vec<MeshDefect>) {
-    let mut corners = vec![0_u32; mesh.positions.len()];
-    let mut first = vec![NONE; mesh.positions.len()];
-    for (half_edge, &opposite) in opposites.iter().enumerate() {
-        let (vertex, _) = ends(mesh, half_edge);
-        corners[vertex.index()] += 1;
-        let slot = &mut first[vertex.index()];
-        // On a border start where the turn begins, so that it meets every corner of the fan.
-        if *slot == NONE || opposite == NONE {
-            *slot = crate::index::checked_u32(half_edge);
+/// How many sides of a link are passed from `first` on, each starting where the one before ends, and whether the first
+/// comes again. Links with repeated ends are left after as many steps as there are sides.
+fn turn(link: &[[VertexId; 2]], first: [VertexId; 2]) -> (usize, bool) {
+    let mut at = first;
+    for turned in 1..=link.len() {
+        match link.iter().find(|side| side[0] == at[1]) {
+            Some(&next) if next == first => return (turned, true),
+            Some(&next) => at = next,
+            None => return (turned, false),
         }
     }
-    for (vertex, &start) in first.iter().enumerate() {
-        if start == NONE {
-            continue;
-        }
-        let (mut turned, mut at) = (0, start);
-        loop {
-            turned += 1;
-            // The side before this one in the same triangle ends at the vertex; its opposite leaves it.
-            let before = at / 3 * 3 + (at + 2) % 3;
-            at = opposites[before as usize];
-            if at == NONE || at == start || turned > corners[vertex] {
-                break;
-            }
-        }
-        if turned != corners[vertex] {
-            defects.push(MeshDefect::PinchedVertex(VertexId::from_index(vertex)));
-        }
-    }
+    (0, false)
+}
+
+/// Whether a link's sides, from the first on, are all passed once before the first comes again.
+fn is_circle(link: &[[VertexId; 2]]) -> bool {
+    link.first().is_some_and(|&first| turn(link, first) == (link.len(), true))
+}
+
+fn is_path_or_empty(link: &[[VertexId; 2]]) -> bool {
+    link.is_empty() || path_starts(link).any(|&first| turn(link, first) == (link.len(), false))
+}
+
+/// Sides that start where none ends.
+fn path_starts(link: &[[VertexId; 2]]) -> impl Iterator<Item = &[VertexId; 2]> {
+    link.iter().filter(|side| link.iter().all(|other| other[1] != side[0]))
+}
+
+/// The edges at `vertex` that have more than one triangle on a side, with their other ends.
+fn bad_edges(vertex: VertexId, link: &[[VertexId; 2]]) -> Vec<(VertexId, MeshDefect)> {
+    let ends: BTreeSet<VertexId> = link.iter().flatten().copied().collect();
+    let sides = |end: VertexId| [0, 1].map(|way| link.iter().filter(|side| side[way] == end).count());
+    ends.into_iter()
+        .map(|end| (end, sides(end)))
+        .filter(|(_, [there, back])| *there > 1 || *back > 1)
+        .map(|(end, [there, back])| (end, MeshDefect::BadEdge(vertex, end, there, back)))
+        .collect()
+}
+
+/// The two triangles on `vertex` and `others`, if `vertex` is the lowest of them.
+fn doubled(mesh: &TriMesh, vertex: VertexId, others: [VertexId; 2]) -> Option<MeshDefect> {
+    let [a, b] = others;
+    let mut same = mesh
+        .triangles
+        .iter()
+        .enumerate()
+        .filter(|(_, triangle)| [vertex, a, b].iter().all(|corner| triangle.contains(corner)))
+        .map(|(index, _)| index);
+    (vertex < a.min(b)).then(|| Some(MeshDefect::Doubled(same.next()?, same.next()?))).flatten()
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 //! | mesh, closed mesh | `tri_mesh.rs` |
 //! | what keeps a mesh from being closed | `check.rs` |
 //! | the 256 cases of a cube, derived | `cube_cases.rs` |
-//! | marching cubes over one level | `march.rs` |
+//! | marching cubes over one level, slab by slab | `grid.rs`, `slab.rs`, `march.rs` |
 //! | the solid between two copies of an open sheet | `sheet.rs` |
 //! | nearest points, overlapping pairs | `bvh.rs` |
 //! | where a mesh intersects itself | `intersect.rs` |
@@ -23,19 +23,22 @@ mod bvh;
 mod check;
 mod cube_cases;
 mod format;
+mod grid;
 mod intersect;
 mod march;
 pub mod measure;
 pub mod plate;
 mod section;
 mod sheet;
+mod slab;
 mod tri_mesh;
 
 pub use bvh::{Bvh, Closest};
 pub use check::MeshDefect;
 pub use format::{Part, WriteError, write_3mf, write_glb, write_obj, write_ply, write_stl};
+pub use grid::Grid;
 pub use intersect::self_intersections;
-pub use march::{Grid, march};
+pub use march::march;
 pub use measure::euler_number;
 pub use section::{CutPlane, SectionLine, section};
 pub use sheet::{Legs, Sheet};

@@ -10,6 +10,7 @@ use super::{
 };
 use crate::index::{Id, IndexVec};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// A triangle mesh whose every edge has one or two triangles and whose every vertex has one fan.
 #[derive(Clone, Debug)]
@@ -79,10 +80,12 @@ impl Sheet {
             strips.close(*edge);
         }
         strips.close_leg_ends(&self.border);
+        let corners = |&triangle: &[VertexId; 3]| solid.corners(triangle);
         let degenerate: Vec<MeshDefect> = solid
-            .triangle_corners()
+            .triangles
+            .par_iter()
             .enumerate()
-            .filter(|(_, [a, b, c])| (*b - *a).cross(*c - *a) == DVec3::ZERO)
+            .filter(|(_, triangle)| check::has_no_area(corners(triangle)))
             .map(|(index, _)| MeshDefect::Degenerate(index))
             .collect();
         if degenerate.is_empty() {

@@ -124,15 +124,17 @@ pub fn preview(enclosure: &Enclosure, inspection: &Inspection) -> Result<Figure,
     Ok(drawing.finish())
 }
 
+/// The cosine up to which a vertex counts as smooth: neighbouring faces of a shell differ by a few degrees, a vertex at a
+/// rim by tens.
+const SMOOTH: f64 = 0.985;
+
 /// A shaded picture of parts, each moved to its place; of the shells only triangles whose middle is `kept`.
 fn picture_of(
     placed: &[(&PrintPart, DVec3)],
     (width, height): (u32, u32),
     kept: impl Fn(DVec3) -> bool,
 ) -> image::RgbImage {
-    let all = placed
-        .iter()
-        .flat_map(|(part, by)| part.solid.mesh().positions.iter().step_by(7).map(move |&p| p + *by));
+    let all = placed.iter().flat_map(|(part, by)| part.solid.mesh().positions.iter().map(move |&p| p + *by));
     let camera = Camera::fit(all, EYE, DVec3::Z, f64::from(width) / f64::from(height));
     let mut canvas = Canvas::new(width, height, camera);
     for (part, by) in placed {
@@ -146,7 +148,7 @@ fn picture_of(
                 let shaded = [0, 1, 2].map(|i| {
                     let smooth = normals[triangle[i].index()];
                     // At sharp edges the face's own normal; elsewhere the smooth one.
-                    let rounded = part.name != "base" && smooth.dot(face) > 0.8;
+                    let rounded = part.name != "base" && smooth.dot(face) > SMOOTH;
                     let normal = if rounded { smooth } else { face };
                     Corner { position: corners[i] + *by, normal }
                 });

@@ -68,7 +68,7 @@ const FILM: Colour = Colour([0xd8, 0xc6, 0x9a]);
 const SEAM: f64 = 0.025;
 
 /// A number is shown where the floor faces the eye at least this much (the cosine of the angle).
-const FACING: f64 = 0.35;
+const FACING: f64 = 0.2;
 
 impl FoamScene {
     /// The scene of a partition.
@@ -176,8 +176,15 @@ impl FoamScene {
             let across =
                 0.5 * canvas.pixel_of(cell.middle + radius * DVec3::Z).distance(canvas.pixel_of(cell.middle));
             let size = (0.9 * across).clamp(9.0, 30.0);
-            let ink = if sides == 7 || sides > 8 { Colour([255; 3]) } else { INK };
-            sheet.text([at.x, at.y + 0.35 * size], size, Anchor::Middle, ink, &sides.to_string());
+            let text = sides.to_string();
+            let place = at + DVec2::new(0.0, 0.35 * size);
+            // A rim of the other ink keeps the number legible where the cell lies in shade.
+            let [ink, rim] = inks_on(colour_of(cell.sides));
+            for offset in RIM {
+                let moved = place + 0.06 * size * DVec2::from_array(offset);
+                sheet.text(moved.to_array(), size, Anchor::Middle, rim, &text);
+            }
+            sheet.text(place.to_array(), size, Anchor::Middle, ink, &text);
         }
     }
 
@@ -223,6 +230,17 @@ fn seam(cell: &DrawnCell, width: f64) -> Vec<[Corner; 3]> {
     };
     let sides = cell.edge.iter().zip(cell.edge.iter().cycle().skip(1));
     sides.flat_map(|(&a, &b)| [0.3 * width, -0.3 * width].map(|lift| strip(a, b, lift))).flatten().collect()
+}
+
+/// The directions in which a number's rim is laid.
+const RIM: [[f64; 2]; 8] =
+    [[1.0, 0.0], [0.7, 0.7], [0.0, 1.0], [-0.7, 0.7], [-1.0, 0.0], [-0.7, -0.7], [0.0, -1.0], [0.7, -0.7]];
+
+/// The ink that stands out on a colour, and the other one: by the luma of ITU-R BT.601.
+fn inks_on(Colour([red, green, blue]): Colour) -> [Colour; 2] {
+    let luma = 0.299 * f64::from(red) + 0.587 * f64::from(green) + 0.114 * f64::from(blue);
+    let white = Colour([255; 3]);
+    if luma < 140.0 { [white, INK] } else { [INK, white] }
 }
 
 fn colour_of(sides: Option<u32>) -> Colour {

@@ -14,10 +14,14 @@
 //! | where a bubble wants to be: table, charts, coloured surface | `bubble.rs` |
 //! | two layers of cells: picture, table | `layers.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
+//! | a comparison's charts, tables and files | `compare_charts.rs`, `compare_map.rs`, `compare_files.rs` |
 
 pub mod bubble;
 pub mod comb;
 mod comb_overlay;
+pub mod compare_charts;
+pub mod compare_files;
+pub mod compare_map;
 pub mod enclosure;
 pub mod enclosure_drawing;
 pub mod enclosure_section;

@@ -32,7 +32,18 @@ impl<S: LevelSet + ?Sized> GridSampler for Evaluated<'_, S> {
 
 /// Samples a sum `f(x) + g(y) + h(z)` from three tables: two additions a node.
 pub(super) struct Separable {
-    pub(super) tables: [Vec<f64>; 3],
+    tables: [Vec<f64>; 3],
+    /// The least and the greatest entry along x.
+    range: [f64; 2],
+}
+
+impl Separable {
+    pub(super) fn new(tables: [Vec<f64>; 3]) -> Self {
+        let range = tables[0]
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)]);
+        Self { tables, range }
+    }
 }
 
 impl GridSampler for Separable {
@@ -42,6 +53,11 @@ impl GridSampler for Separable {
 
     fn row_above(&self, j: usize, k: usize, level: f64, above: &mut [u8]) {
         let rest = self.tables[1][j] + self.tables[2][k];
+        // Many rows lie on one side as a whole; sums round the same way for every entry, so the ends speak for all.
+        if self.range[0] + rest > level || self.range[1] + rest <= level {
+            above.fill(u8::from(self.range[0] + rest > level));
+            return;
+        }
         for (flag, first) in above.iter_mut().zip(&self.tables[0]) {
             *flag = u8::from(first + rest > level);
         }

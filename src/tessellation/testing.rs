@@ -44,3 +44,11 @@ pub(crate) fn hexagons(columns: usize, rows: usize, turn: f64) -> CellPattern {
         Err(defects) => panic!("{defects:?}"),
     }
 }
+
+/// Hexagons on a torus after random flips.
+pub(crate) fn flipped_torus(columns: usize, rows: usize, flips: usize, seed: u64) -> CellPattern {
+    match super::flipped_hexagons(columns, rows, flips, seed) {
+        Ok(pattern) => pattern,
+        Err(defects) => panic!("{defects:?}"),
+    }
+}

@@ -14,6 +14,7 @@ use crate::{
 };
 use glam::{DVec3, IVec3};
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 
 /// How finely films are meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -333,15 +334,18 @@ fn middle_of(
     surface.project(guess, level).map_err(|_| NoExtrusion { place: guess })
 }
 
+/// Gauss points for the length of a quadratic piece, good to 1e-8 of it: places of nodes along a film need no more.
+static ARC_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| super::shape::gauss(4));
+
 /// Spaces the inner nodes of a chain of quadratic pieces evenly along it. Gives the largest move.
 fn spread_curve(network: &Network, places: &mut Places, ids: &[NodeImage]) -> f64 {
     let translation = |image: &NodeImage| network.period().translation(image.shift);
     let points: Vec<DVec3> = ids.iter().map(|image| places[image.node] + translation(image)).collect();
     let pieces = points.len() / 2;
-    let rule = super::shape::gauss(4);
     let piece_length = |piece: usize, to: f64| -> f64 {
         let p = &points[2 * piece..2 * piece + 3];
-        rule.iter()
+        ARC_RULE
+            .iter()
             .map(|&(t, weight)| {
                 let (_, d) = super::shape::quadratic(t * to);
                 to * weight * (d[0] * p[0] + d[1] * p[1] + d[2] * p[2]).length()

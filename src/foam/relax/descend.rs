@@ -10,7 +10,7 @@ use crate::{
     foam::{
         complex::{Complex, Places, RegionId, RegionKind},
         energy::{self, energy},
-        solve::{FactorError, Residuals, Step, System},
+        solve::{FactorError, Mode, Residuals, Step, System},
         volume::{Reference, volumes},
     },
     index::IndexVec,
@@ -89,6 +89,8 @@ pub struct Descent {
 const LONGEST_STEP: f64 = 0.25;
 /// The part of an element's edge that one step may take away.
 const LARGEST_SHRINKING: f64 = 0.6;
+/// By what factor one step may change a volume: films between a swelling and a shrinking cell turn over beyond it.
+const MOST_GROWTH: f64 = 1.5;
 /// The wall patches are integrated anew after moves of this part of the cell size: strips are thin below it.
 const REBASE_AFTER: f64 = 0.1;
 /// The penalty on volume errors, in units of the tension over cell size and cell volume. A cell's own stiffness against a
@@ -96,12 +98,14 @@ const REBASE_AFTER: f64 = 0.1;
 const PENALTY: f64 = 10.0;
 /// Residuals below which full Newton steps are taken without a look at the merit.
 const TRUSTED: f64 = 1e-3;
+/// Volume errors above which pressures are those that balance the forces, not those that bring the volumes.
+const FAR: f64 = 0.02;
 /// Steps without progress before a descent counts as stalled.
 const IDLE_STEPS: usize = 25;
 /// A fall of the energy that counts as progress, relative.
 const FALL: f64 = 1e-6;
 /// Halvings of a step before it is stiffened instead.
-const HALVINGS: usize = 6;
+const HALVINGS: usize = 8;
 /// The first stiffening after a step that did not help, in units of the tension, and its growth.
 const FIRST_DAMPING: f64 = 1e-2;
 const DAMPING_GROWTH: f64 = 10.0;
@@ -110,6 +114,8 @@ const MOST_DAMPING: f64 = 1e4;
 /// How far a saddle is left along its lowest mode, in units of the cell size: far enough that the energy falls by more than
 /// rounding, near enough that the mode still is one.
 const PUSH: f64 = 0.02;
+/// Saddles that one descent leaves: one that comes back each time has a mode that the mesh makes up.
+const MOST_PUSHES: usize = 10;
 
 impl Descent {
     /// Starts at `places` with the given `pressures`; these are the Lagrange multipliers' first guess for cells and the true
@@ -177,6 +183,21 @@ impl Descent {
         self.rebase();
     }
 
+    /// Integrates all wall patches where the films are now: small errors of the strips that were added since vanish.
+    pub fn integrate_walls(&mut self) {
+        self.reference = Reference::new(&self.complex, &self.places);
+        self.targets = self.fitted_targets();
+        self.system.reframe(&self.complex, &self.places);
+    }
+
+    /// The softest way in which the films can move at constant volumes.
+    ///
+    /// # Errors
+    /// [`FactorError`] as for a step.
+    pub fn lowest_mode(&self) -> Result<Mode, FactorError> {
+        self.system.lowest_mode(&self.complex, &self.places, &self.reference, &self.pressures)
+    }
+
     /// Newton steps until `settings` are met.
     ///
     /// # Errors
@@ -189,10 +210,14 @@ impl Descent {
         let mut best = f64::INFINITY;
         let mut lowest = f64::INFINITY;
         let mut idle = 0;
+        let mut pushes = 0;
         let mut steps = 0;
         loop {
-            let step = self.step()?;
-            let residuals = self.relative(&step.residuals, settings.length);
+            let now = self.volumes();
+            let aims = self.aims(&now);
+            let excess = now.iter().zip(&aims).map(|(now, aim)| now - aim).collect();
+            let step = self.step(&excess)?;
+            let residuals = self.residuals(&step, &now, settings.length);
             let unstable = step.unstable;
             let ended = |ending| Ok(Descended { ending, steps, residuals, unstable });
             let size =
@@ -215,10 +240,14 @@ impl Descent {
                 return ended(Ending::Stalled);
             }
             let fraction = if size <= 1.0 {
+                pushes += 1;
+                if pushes > MOST_PUSHES {
+                    return ended(Ending::Stalled);
+                }
                 (best, lowest) = (f64::INFINITY, f64::INFINITY);
                 self.leave_saddle(settings.length)?
             } else {
-                self.take(&step, &residuals, settings.length)
+                self.take(&step, &aims, &residuals, settings.length)
             };
             steps += 1;
             if observer(&DescentStep { descent: self, residuals, fraction, unstable }).is_break() {
@@ -227,19 +256,38 @@ impl Descent {
         }
     }
 
-    fn step(&self) -> Result<Step, FactorError> {
-        self.system.step(
+    fn step(&self, excess: &IndexVec<RegionId, f64>) -> Result<Step, FactorError> {
+        self.system.step_by(
             &self.complex,
             &self.places,
             &self.reference,
             &self.pressures,
-            &self.targets,
+            excess,
             self.damping,
         )
     }
 
-    fn relative(&self, residuals: &Residuals, length: f64) -> Residuals {
-        Residuals { force: residuals.force / length, volume: residuals.volume / self.mean_target() }
+    /// The volumes that the next step aims at: the targets, or as far towards them as films bear in one step.
+    fn aims(&self, now: &IndexVec<RegionId, f64>) -> IndexVec<RegionId, f64> {
+        let mut aims = self.targets.clone();
+        for (id, region) in self.complex.regions.enumerated() {
+            if region.kind == RegionKind::Cell && now[id] > 0.0 {
+                aims[id] = aims[id].clamp(now[id] / MOST_GROWTH, now[id] * MOST_GROWTH);
+            }
+        }
+        self.fit(&mut aims, now);
+        aims
+    }
+
+    fn residuals(&self, step: &Step, now: &IndexVec<RegionId, f64>, length: f64) -> Residuals {
+        let worst = self
+            .complex
+            .regions
+            .enumerated()
+            .filter(|(_, region)| region.kind == RegionKind::Cell)
+            .map(|(id, _)| (now[id] - self.targets[id]).abs())
+            .fold(0.0, |a: f64, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) });
+        Residuals { force: step.residuals.force / length, volume: worst / self.mean_target() }
     }
 
     fn mean_target(&self) -> f64 {
@@ -254,21 +302,28 @@ impl Descent {
 
     /// Takes as much of a step as the elements bear and the merit allows. Gives the fraction taken: 0 if there is none; the
     /// next step is stiffer then.
-    fn take(&mut self, step: &Step, residuals: &Residuals, length: f64) -> f64 {
+    fn take(
+        &mut self,
+        step: &Step,
+        aims: &IndexVec<RegionId, f64>,
+        residuals: &Residuals,
+        length: f64,
+    ) -> f64 {
         let longest = self.longest_fraction(&step.displacements, length);
         let near = residuals.force < TRUSTED
             && residuals.volume < TRUSTED
             && step.unstable == 0
             && self.damping < MOST_DAMPING;
-        let start = if near { 0.0 } else { self.merit(step, &self.places, length) };
+        let start = if near { 0.0 } else { self.merit(step, aims, &self.places, length) };
         let mut fraction = longest;
         for _ in 0..HALVINGS {
             if let Some(places) = self.system.moved(&self.complex, &self.places, step, fraction)
                 && self.keeps_elements(&places)
-                && (near || self.merit(step, &places, length) <= start)
+                && (near || self.merit(step, aims, &places, length) <= start)
             {
                 self.places = places;
-                for (id, change) in step.direction.pressures.enumerated() {
+                let changes = if residuals.volume > FAR { &step.balance } else { &step.direction.pressures };
+                for (id, change) in changes.enumerated() {
                     self.pressures[id] += *change;
                 }
                 if self.moved_since_reference() > REBASE_AFTER * length {
@@ -285,7 +340,7 @@ impl Descent {
     }
 
     /// The augmented Lagrangian at the step's new pressures: a Newton step goes downhill on it if the penalty is stiff.
-    fn merit(&self, step: &Step, places: &Places, length: f64) -> f64 {
+    fn merit(&self, step: &Step, aims: &IndexVec<RegionId, f64>, places: &Places, length: f64) -> f64 {
         let now = volumes(&self.complex, places, &self.reference);
         let stiffness = PENALTY / (length * self.mean_target());
         let work: f64 = now
@@ -295,7 +350,7 @@ impl Descent {
                 match self.complex.regions[id].kind {
                     RegionKind::Open => -pressure * volume,
                     RegionKind::Cell => {
-                        let missing = volume - self.targets[id];
+                        let missing = volume - aims[id];
                         (0.5 * stiffness * missing - pressure) * missing
                     }
                 }
@@ -342,7 +397,7 @@ impl Descent {
 
     /// Integrates the wall patches anew and takes new frames.
     fn rebase(&mut self) {
-        self.reference = Reference::new(&self.complex, &self.places);
+        self.reference = self.reference.moved(&self.complex, &self.places);
         self.targets = self.fitted_targets();
         self.system.reframe(&self.complex, &self.places);
     }
@@ -350,20 +405,24 @@ impl Descent {
     /// The wanted volumes; in closed parts brought to the sum that the walls hold.
     fn fitted_targets(&self) -> IndexVec<RegionId, f64> {
         let mut targets = self.wanted.clone();
-        let now = self.volumes();
+        self.fit(&mut targets, &self.volumes());
+        targets
+    }
+
+    /// Brings the volumes of closed parts to the sum that they have now.
+    fn fit(&self, volumes: &mut IndexVec<RegionId, f64>, now: &IndexVec<RegionId, f64>) {
         for part in self.system.closed_parts() {
             let total: f64 = part.iter().map(|&id| now[id]).sum();
-            let wanted: f64 = part.iter().map(|&id| self.wanted[id]).sum();
+            let sum: f64 = part.iter().map(|&id| volumes[id]).sum();
             for &id in part {
-                targets[id] *= total / wanted;
+                volumes[id] *= total / sum;
             }
         }
-        targets
     }
 
     /// Leaves a balance that is no minimum along its lowest mode, to the side where the energy falls faster. Gives 1.
     fn leave_saddle(&mut self, length: f64) -> Result<f64, FactorError> {
-        let mode = self.system.lowest_mode(&self.complex, &self.places, &self.reference, &self.pressures)?;
+        let mode = self.lowest_mode()?;
         let step = self.system.along(&self.complex, &self.places, mode.direction);
         let longest = step.displacements.iter().map(|d| d.length()).fold(0.0, f64::max);
         let push = PUSH * length / longest;
@@ -371,7 +430,7 @@ impl Descent {
             .into_iter()
             .filter_map(|push| self.system.moved(&self.complex, &self.places, &step, push))
             .filter(|places| self.keeps_elements(places))
-            .map(|places| (self.merit(&step, &places, length), places))
+            .map(|places| (self.merit(&step, &self.targets, &places, length), places))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, places)) = best {
             self.set_places(places);

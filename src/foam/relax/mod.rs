@@ -12,18 +12,18 @@ pub use state::{STATE_SCHEMA, State};
 
 use super::{
     complex::{NoExtrusion, Strips},
-    network::{CellId, Network},
+    network::{CellId, EdgeId, Network, VertexId},
     solve::{FactorError, Residuals},
     topology,
 };
 use crate::{index::IndexVec, surface::Gap};
 use serde::{Deserialize, Serialize};
-use std::ops::ControlFlow;
+use std::{collections::BTreeSet, ops::ControlFlow};
 
 /// What can be set about a relaxation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RelaxSettings {
-    /// The mesh of the result.
+    /// The mesh of the result; films that turn far with the walls get more elements along.
     pub strips: Strips,
     /// Ends when the largest force on a freedom is below this, in units of tension × cell width.
     pub tolerance: f64,
@@ -141,9 +141,34 @@ pub fn relax(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
     let shares = shares(&network, settings.shares.as_deref())?;
-    let coarse = Strips { along: 2, through: 1 };
-    let state = State::new(network, gap, coarse, shares)?;
+    let coarse = Strips { along: LEAST_ALONG, through: 1 };
+    let mut state = State::new(network, gap, coarse, shares)?;
+    let along = elements_along(&state, gap);
+    if along > coarse.along {
+        state = State::new(state.network, gap, Strips { along, ..coarse }, state.shares)?;
+    }
     resume(state, gap, settings, progress)
+}
+
+/// The least number of elements along a film: with one, T1s happen on films that are only bent.
+const LEAST_ALONG: usize = 2;
+/// The most elements along a film of the coarse mesh: half a great circle needs no more.
+const MOST_ALONG: usize = 8;
+/// The angle that one element may turn with the walls, in radians: at 1.5 a film leaves the gap between its nodes.
+const MOST_TURN: f64 = 0.9;
+
+/// How many elements along each film follow the walls.
+fn elements_along(state: &State, gap: &Gap) -> usize {
+    let network = &state.network;
+    let turn = network.edges().map(|edge| {
+        let side = edge.half_edges()[0];
+        let mut line = state.side_line(side, state.rows() / 2);
+        line.extend(state.side_line(network.next(side), state.rows() / 2).first());
+        let length: f64 = line.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+        length * gap.middle().curvature(line[line.len() / 2]).largest()
+    });
+    let most = turn.filter(|turn| turn.is_finite()).fold(0.0, f64::max) / MOST_TURN;
+    (LEAST_ALONG..MOST_ALONG).find(|&along| real(along) >= most).unwrap_or(MOST_ALONG)
 }
 
 fn shares(network: &Network, given: Option<&[f64]>) -> Result<IndexVec<CellId, f64>, RelaxError> {
@@ -186,6 +211,14 @@ pub fn resume(
     Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable })
 }
 
+/// The lowest eigenvalue of the Hessian at constant volumes of a foam in balance; see [`super::solve::Mode`].
+///
+/// # Errors
+/// [`FactorError`] if the system cannot be factored.
+pub fn lowest_eigenvalue(state: &State, gap: &Gap) -> Result<f64, FactorError> {
+    Ok(state.descent(gap)?.lowest_mode()?.eigenvalue)
+}
+
 /// The residual at which the mesh is refined: T1s have ended there, and two more steps would converge the coarse mesh.
 const COARSE_TOLERANCE: f64 = 1e-4;
 /// The residual between two spreadings of the nodes: the next one disturbs the balance by more.
@@ -195,6 +228,16 @@ const SPREADINGS: usize = 5;
 /// Nodes that move less than this part of the cell width need not be spread again.
 const EVEN_ENOUGH: f64 = 1e-6;
 
+/// Steps shorter than this part of Newton's leave uneven nodes behind, which stop later ones.
+const DAMPED: f64 = 0.9;
+
+/// Steps after the last T1 in which uneven nodes are spread after damped steps; what has not settled by then, spreading
+/// alone will not settle.
+const SPREAD_FOR: usize = 30;
+
+/// How often crumpled films are laid anew before a run counts as stalled.
+const MOST_LAID_ANEW: usize = 3;
+
 struct Run<'a> {
     gap: &'a Gap,
     settings: &'a RelaxSettings,
@@ -202,11 +245,14 @@ struct Run<'a> {
     descent: Descent,
     residuals: Residuals,
     unstable: usize,
+    laid_anew: usize,
+    refined: bool,
 }
 
 /// Why Newton steps were halted.
 enum Halt {
     Flip,
+    Spread,
     Interrupt,
 }
 
@@ -214,7 +260,7 @@ impl<'a> Run<'a> {
     fn new(state: State, gap: &'a Gap, settings: &'a RelaxSettings) -> Result<Self, RelaxError> {
         let descent = state.descent(gap)?;
         let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
-        Ok(Self { gap, settings, state, descent, residuals, unstable: 0 })
+        Ok(Self { gap, settings, state, descent, residuals, unstable: 0, laid_anew: 0, refined: false })
     }
 
     /// Newton steps with T1s until the residual is below `tolerance`; `None` then, otherwise why it stopped.
@@ -223,6 +269,7 @@ impl<'a> Run<'a> {
         tolerance: f64,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Option<Stop>, RelaxError> {
+        let mut patience = self.state.steps + SPREAD_FOR;
         loop {
             let settings = DescentSettings {
                 length: self.state.cell_width(),
@@ -232,7 +279,9 @@ impl<'a> Run<'a> {
             };
             let flip_below = self.settings.flip_below;
             let Self { state, descent, .. } = self;
+            let mut lengths = topology::edge_lengths(state);
             let mut halt = None;
+            let mut vanishing = Vec::new();
             let descended = descent.descend(&settings, &mut |told| {
                 state.follow(told.descent);
                 let told = Progress {
@@ -244,13 +293,22 @@ impl<'a> Run<'a> {
                 };
                 if progress(&told).is_break() {
                     halt = Some(Halt::Interrupt);
-                } else if !topology::short_edges(state, flip_below).is_empty() {
-                    halt = Some(Halt::Flip);
+                } else {
+                    let before = std::mem::replace(&mut lengths, topology::edge_lengths(state));
+                    vanishing = topology::vanishing_edges(state, &before, flip_below);
+                    halt = if !vanishing.is_empty() {
+                        Some(Halt::Flip)
+                    } else {
+                        (told.fraction < DAMPED && state.steps < patience).then_some(Halt::Spread)
+                    };
                 }
                 if halt.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
             let steps = self.state.steps;
             let Ok(descended) = descended else {
+                if self.lay_anew()? {
+                    continue;
+                }
                 return Ok(Some(Stop::Stalled { steps, residual: self.residuals.force }));
             };
             (self.residuals, self.unstable) = (descended.residuals, descended.unstable);
@@ -258,21 +316,59 @@ impl<'a> Run<'a> {
             match (descended.ending, halt) {
                 (Ending::Converged, _) => return Ok(None),
                 (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
+                (Ending::Stalled, _) if self.lay_anew()? => patience = steps + SPREAD_FOR,
                 (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
-                (Ending::Halted, Some(Halt::Flip)) => self.flip_short()?,
+                (Ending::Halted, Some(Halt::Flip)) => {
+                    self.flip(&vanishing)?;
+                    patience = steps + SPREAD_FOR;
+                }
+                (Ending::Halted, Some(Halt::Spread)) => {
+                    self.spread();
+                }
                 (Ending::Halted, _) => return Ok(Some(Stop::Interrupted { steps })),
             }
         }
     }
 
-    /// Flips the edges that are short enough.
-    fn flip_short(&mut self) -> Result<(), RelaxError> {
-        // An earlier flip may have lengthened the next edge or made its flip impossible.
-        while let Some(&edge) = topology::short_edges(&self.state, self.settings.flip_below).first() {
-            topology::flip(&mut self.state, self.gap, edge);
+    /// Flips edges that do not touch each other, in order.
+    fn flip(&mut self, vanishing: &[EdgeId]) -> Result<(), RelaxError> {
+        let mut touched: BTreeSet<VertexId> = BTreeSet::new();
+        for &edge in vanishing {
+            let round = topology::round(&self.state.network, edge);
+            if round.iter().all(|vertex| !touched.contains(vertex)) {
+                topology::flip(&mut self.state, self.gap, edge);
+                touched.extend(round);
+            }
         }
         self.descent = self.state.descent(self.gap)?;
         Ok(())
+    }
+
+    /// Films that crumpled on the way from a rough start are laid anew between vertices that were drawn apart; who touches
+    /// whom stays. Gives whether that was done: only on the coarse mesh, and not often.
+    fn lay_anew(&mut self) -> Result<bool, RelaxError> {
+        if self.laid_anew == MOST_LAID_ANEW || self.refined {
+            return Ok(false);
+        }
+        self.laid_anew += 1;
+        let state = &mut self.state;
+        state.follow_films();
+        topology::draw_apart(&mut state.network, self.gap);
+        state.places = state.strips.first_places(&state.network, self.gap)?;
+        state.pressures.iter_mut().for_each(|pressure| *pressure = 0.0);
+        self.descent = state.descent(self.gap)?;
+        Ok(true)
+    }
+
+    /// Spreads the nodes evenly along the films. Gives the largest move.
+    fn spread(&mut self) -> f64 {
+        let mut places = self.state.places.clone();
+        let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
+        if self.descent.complex().retract(&mut places).is_ok() {
+            self.state.places.clone_from(&places);
+            self.descent.set_places(places);
+        }
+        moved
     }
 
     /// The final mesh: refined, spread evenly, converged.
@@ -280,18 +376,20 @@ impl<'a> Run<'a> {
         &mut self,
         progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Result<Stop, RelaxError> {
-        if self.state.strips != self.settings.strips {
-            self.state.refine(self.settings.strips);
+        self.refined = true;
+        let Strips { along, through } = self.settings.strips;
+        let strips = Strips { along: along.max(self.state.strips.along), through };
+        if self.state.strips != strips {
+            self.state.refine(strips);
             self.descent = self.state.descent(self.gap)?;
         }
         let mut last = false;
         for round in 1..=SPREADINGS {
-            let mut places = self.state.places.clone();
-            let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
-            if self.descent.complex().retract(&mut places).is_ok() {
-                self.descent.set_places(places);
-            }
+            let moved = self.spread();
             last |= moved <= EVEN_ENOUGH * self.state.cell_width() || round == SPREADINGS;
+            if last {
+                self.descent.integrate_walls();
+            }
             let tolerance = if last { self.settings.tolerance } else { SPREAD_TOLERANCE };
             if let Some(stop) = self.newton(tolerance, progress)? {
                 return Ok(stop);
@@ -306,73 +404,4 @@ impl<'a> Run<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        foam::network::tests::hexagons,
-        surface::{LevelSet, Plane},
-    };
-    use glam::DVec3;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use std::sync::Arc;
-
-    const HEIGHT: f64 = 0.5;
-
-    fn crooked_hexagons() -> (Network, Gap) {
-        let mut network = hexagons(4, 4);
-        let [Some(x), Some(y), None] = network.period().0 else { panic!("a flat torus") };
-        let mut random = ChaCha8Rng::seed_from_u64(2);
-        let mut noise = || random.random_range(-0.1..0.1);
-        for vertex in network.vertices() {
-            let place = network.position(vertex) + DVec3::new(noise(), noise(), 0.0);
-            network.set_position(vertex, place);
-        }
-        let plane: Arc<dyn LevelSet> = Arc::new(Plane { periods: [x, y] });
-        (network, Gap::between(plane, [-0.5 * HEIGHT, 0.5 * HEIGHT]).unwrap())
-    }
-
-    #[test]
-    fn crooked_hexagons_become_the_hexagonal_foam() {
-        let (network, gap) = crooked_hexagons();
-        let mut last = 0.0;
-        let relaxed = relax(network, &gap, &RelaxSettings::default(), &mut |told| {
-            last = told.energy;
-            ControlFlow::Continue(())
-        })
-        .unwrap();
-        assert!(matches!(relaxed.stop, Stop::Converged { .. }), "{:?}", relaxed.stop);
-        assert_eq!(relaxed.unstable, 0);
-        // Films are flat: the energy of cells of area 1 is exact, h √(2√3) each.
-        let exact = 16.0 * HEIGHT * (2.0 * 3.0_f64.sqrt()).sqrt();
-        assert!((last - exact).abs() < 1e-12 * exact, "{last} {exact}");
-    }
-
-    #[test]
-    fn a_state_read_back_goes_on_to_the_same_foam() {
-        let (network, gap) = crooked_hexagons();
-        let settings = RelaxSettings::default();
-        let mut saved = None;
-        let stopped = relax(network, &gap, &settings, &mut |told| {
-            saved = Some(serde_json::to_string(told.state).unwrap());
-            ControlFlow::Break(())
-        })
-        .unwrap();
-        assert_eq!(stopped.stop, Stop::Interrupted { steps: 1 });
-        let read: State = serde_json::from_str(&saved.unwrap()).unwrap();
-        let go_on = |state| resume(state, &gap, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
-        let (a, b) = (go_on(stopped.state), go_on(read));
-        assert!(matches!(a.stop, Stop::Converged { .. }));
-        assert_eq!(a.state.places, b.state.places);
-    }
-
-    #[test]
-    fn shares_must_be_one_positive_number_for_each_cell() {
-        let (network, gap) = crooked_hexagons();
-        for shares in [vec![1.0; 3], vec![0.0; 16], vec![f64::NAN; 16]] {
-            let settings = RelaxSettings { shares: Some(shares), ..RelaxSettings::default() };
-            let refused = relax(network.clone(), &gap, &settings, &mut |_| ControlFlow::Continue(()));
-            assert!(matches!(refused, Err(RelaxError::Shares { .. })));
-        }
-    }
-}
+mod tests;

@@ -10,7 +10,15 @@ use crate::foam::{
     volume::{Reference, StripLoads, WallEdge},
 };
 use crate::index::IndexVec;
-use faer::{Accum, Mat, MatRef, Par, Side, linalg::matmul::matmul, linalg::solvers::Llt, prelude::Solve};
+use faer::{
+    Accum, Mat, MatMut, MatRef, Par, Spec,
+    dyn_stack::{MemBuffer, MemStack},
+    linalg::{
+        cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch},
+        matmul::matmul,
+        triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place},
+    },
+};
 use glam::{DMat3, DVec3};
 
 /// The state that a film is assembled at.
@@ -40,7 +48,7 @@ pub(super) struct FilmSystem {
     pub(super) matrix: Mat<f64>,
     /// Whether the inner block had to be stiffened to be positive definite.
     pub(super) stiffened: bool,
-    factor: Option<Llt<f64>>,
+    factor: Option<Factor>,
     /// Inner rows of the matrix before condensation.
     coupling: Mat<f64>,
     /// The inverse inner block times `coupling`.
@@ -250,11 +258,30 @@ pub(super) fn condense(layout: &FilmLayout, film: &FilmHessian, shift: f64) -> F
     FilmSystem { matrix, stiffened, factor, coupling, answer }
 }
 
+/// A dense Cholesky factor, its upper triangle undefined. Films are many and small: threads work on films, never within one.
+struct Factor(Mat<f64>);
+
+impl Factor {
+    fn new(mut matrix: Mat<f64>) -> Option<Self> {
+        let size = matrix.nrows();
+        let mut memory =
+            MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Spec::default())).ok()?;
+        let stack = MemStack::new(&mut memory);
+        cholesky_in_place(matrix.as_mut(), Default::default(), Par::Seq, stack, Spec::default()).ok()?;
+        Some(Self(matrix))
+    }
+
+    fn solve_in_place(&self, mut rhs: MatMut<'_, f64>) {
+        solve_lower_triangular_in_place(self.0.as_ref(), rhs.as_mut(), Par::Seq);
+        solve_upper_triangular_in_place(self.0.transpose(), rhs, Par::Seq);
+    }
+}
+
 /// Tenfold stiffenings tried before a film's inner block counts as hopeless.
 const STIFFENINGS: i32 = 12;
 
 /// The Cholesky factor of the inner block with `shift` on its diagonal, stiffened further until it is positive definite.
-fn positive_factor(block: MatRef<'_, f64>, shift: f64) -> (Option<Llt<f64>>, bool) {
+fn positive_factor(block: MatRef<'_, f64>, shift: f64) -> (Option<Factor>, bool) {
     let inner = block.nrows();
     if inner == 0 {
         return (None, false);
@@ -266,7 +293,7 @@ fn positive_factor(block: MatRef<'_, f64>, shift: f64) -> (Option<Llt<f64>>, boo
         for i in 0..inner {
             stiff[(i, i)] += shift + extra;
         }
-        if let Ok(factor) = stiff.llt(Side::Lower) {
+        if let Some(factor) = Factor::new(stiff) {
             return (Some(factor), attempt >= 0);
         }
     }

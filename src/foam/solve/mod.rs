@@ -15,6 +15,7 @@ mod mode;
 mod motion;
 mod rigid;
 mod sparse;
+pub(crate) mod symmetric;
 
 pub use mode::Mode;
 pub use sparse::FactorError;
@@ -64,6 +65,9 @@ pub struct Direction {
 pub struct Step {
     /// Where to go.
     pub direction: Direction,
+    /// The change of pressures that balances the forces best where the films are now, whatever the volumes: far from the
+    /// wanted volumes those of `direction` are what it takes to get there, and bend the Hessian of the next step.
+    pub balance: IndexVec<RegionId, f64>,
     /// Displacements of all nodes for the full step, before the return to the walls.
     pub displacements: Places,
     /// The part of them that belongs to each node's own freedoms.
@@ -196,25 +200,45 @@ impl System {
         damping: f64,
     ) -> Result<Step, FactorError> {
         let now = volumes(complex, places, reference);
+        let excess = now.iter().zip(targets).map(|(now, target)| now - target).collect();
+        self.step_by(complex, places, reference, pressures, &excess, damping)
+    }
+
+    /// As [`System::step`], with the volumes that the cells have too much.
+    ///
+    /// # Errors
+    /// As [`System::step`].
+    pub fn step_by(
+        &self,
+        complex: &Complex,
+        places: &Places,
+        reference: &Reference,
+        pressures: &IndexVec<RegionId, f64>,
+        excess: &IndexVec<RegionId, f64>,
+        damping: f64,
+    ) -> Result<Step, FactorError> {
         let motions = Motions::new(complex, places, &self.layout, &self.frames);
         let at = At { complex, places, reference, pressures, motions: &motions, frames: &self.frames };
         let assembled = self.assemble(&at);
         let walls = self.wall_entries(&at, &assembled);
-        let (rhs, residuals) = self.loads(complex, &assembled, &now, targets);
+        let (rhs, residuals) = self.loads(complex, &assembled, excess);
+        let mut forces = rhs.clone();
+        forces.pressures.iter_mut().for_each(|missing| *missing = 0.0);
         let mut solution = None;
         let (unstable, shift) = self.stiffened(&assembled, &walls, damping, |factored, films| {
             solution = self
                 .solve(factored, films, &rhs)
+                .and_then(|direction| Ok((direction, self.solve(factored, films, &forces)?.pressures)))
                 .ok()
-                .filter(|direction| direction.freedoms.iter().all(|x| x.is_finite()));
+                .filter(|(direction, _)| direction.freedoms.iter().all(|x| x.is_finite()));
             solution.is_some()
         })?;
-        let Some(direction) = solution else {
+        let Some((direction, balance)) = solution else {
             return Err(FactorError::Singular { unknowns: self.layout.unknowns });
         };
         let own_displacements = self.own_displacements(complex, &motions, &direction);
         let displacements = self.displacements(complex, places, &own_displacements);
-        Ok(Step { direction, displacements, own_displacements, residuals, unstable, shift })
+        Ok(Step { direction, balance, displacements, own_displacements, residuals, unstable, shift })
     }
 
     /// Stiffens the Hessian from `damping` on until it is positive on the constraints and `accept` takes its factors. Gives
@@ -255,8 +279,7 @@ impl System {
         &self,
         complex: &Complex,
         films: &[FilmHessian],
-        now: &IndexVec<RegionId, f64>,
-        targets: &IndexVec<RegionId, f64>,
+        excess: &IndexVec<RegionId, f64>,
     ) -> (Direction, Residuals) {
         let mut freedoms = vec![0.0; self.layout.of_freedom.len()];
         for (film, layout) in films.iter().zip(&self.layout.films) {
@@ -276,7 +299,7 @@ impl System {
         let pressures: IndexVec<RegionId, f64> = complex
             .regions
             .ids()
-            .map(|id| if self.is_cell(complex, id) { now[id] - targets[id] } else { 0.0 })
+            .map(|id| if self.is_cell(complex, id) { excess[id] } else { 0.0 })
             .collect();
         let most = |values: &[f64]| {
             values.iter().fold(0.0, |most: f64, x| if x.is_nan() { f64::NAN } else { most.max(x.abs()) })

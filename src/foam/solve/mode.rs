@@ -16,7 +16,8 @@ use rand_chacha::ChaCha8Rng;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
     /// The eigenvalue, in units of the tension: the second derivative of the energy along the mode, whose freedoms have the
-    /// Euclidean norm 1. Its sign is that of the softest curvature; its size depends on the mesh.
+    /// Euclidean norm 1. Its sign is that of the softest curvature; its size depends on the mesh and, where rigid motions
+    /// exist, on the freedoms that hold them.
     pub eigenvalue: f64,
     /// The mode.
     pub direction: Direction,
@@ -25,7 +26,7 @@ pub struct Mode {
 /// The most inverse iterations: neighbouring eigenvalues of a foam differ by some percent, and each gains their ratio.
 const ITERATIONS: usize = 60;
 /// The relative change of the eigenvalue that ends the iterations.
-const SETTLED: f64 = 1e-6;
+const SETTLED: f64 = 1e-4;
 
 impl System {
     /// The softest mode at a balance.
@@ -71,7 +72,8 @@ impl System {
         let own_displacements = self.own_displacements(complex, &motions, &direction);
         let displacements = self.displacements(complex, places, &own_displacements);
         let residuals = Residuals { force: 0.0, volume: 0.0 };
-        Step { direction, displacements, own_displacements, residuals, unstable: 0, shift: 0.0 }
+        let balance = direction.pressures.clone();
+        Step { direction, balance, displacements, own_displacements, residuals, unstable: 0, shift: 0.0 }
     }
 
     /// A direction with a part along every mode, always the same.

@@ -95,7 +95,7 @@ fn the_lagrangian_along_a_step_has_the_slope_and_the_bend_that_the_system_says()
     let entries = system.entries(&films, &system.wall_entries(&at, &assembled), 0.0);
     let factored = Factored::new(&system.layout, &system.symbolic, entries, &softening).unwrap();
     assert!(films.iter().all(|film| !film.stiffened));
-    let (loads, _) = system.loads(&complex, &assembled, &targets, &targets);
+    let (loads, _) = system.loads(&complex, &assembled, &IndexVec::from_elem(0.0, complex.regions.len()));
     let mut rhs = loads.clone();
     rhs.freedoms
         .iter_mut()
@@ -111,6 +111,7 @@ fn the_lagrangian_along_a_step_has_the_slope_and_the_bend_that_the_system_says()
     let step = Step {
         displacements: system.displacements(&complex, &places, &own_displacements),
         own_displacements,
+        balance: direction.pressures.clone(),
         direction,
         residuals: Residuals { force: 0.0, volume: 0.0 },
         unstable: 0,

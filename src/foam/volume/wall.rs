@@ -35,12 +35,13 @@ pub(super) fn height(wall: &Wall, y: DVec3, direction: DVec3, guess: f64) -> f64
     let mut last = f64::INFINITY;
     for _ in 0..FOOT_STEPS {
         let p = y + z * direction;
-        let slope = wall.field.gradient(p).dot(direction);
-        let step = wall.value(p) / slope;
+        let (value, gradient) = wall.field.value_and_gradient(p);
+        let step = (value - wall.level) / gradient.dot(direction);
         z -= step;
-        // Newton steps shrink quadratically until rounding: stop when they no longer do.
+        // Newton steps shrink quadratically until rounding: after one of 1e-10 nothing is left, and a wall whose value is
+        // rounded may never get there.
         let size = step.abs();
-        if size <= 1e-15 || (size < 1e-11 && size >= 0.5 * last) {
+        if size <= 1e-10 || (size < 1e-8 && size >= 0.5 * last) {
             return z;
         }
         if !size.is_finite() {
@@ -163,7 +164,8 @@ impl<'a> WallEdge<'a> {
             let p = &point;
             let z = height(self.wall, p.y, p.direction, 0.0);
             let foot = p.y + z * p.direction;
-            let slope = self.wall.field.gradient(foot);
+            let jet = self.wall.field.jet(foot);
+            let slope = jet.gradient;
             let c = slope.dot(p.direction);
             let zy = -slope / c;
             let area = p.ys.cross(p.yt);
@@ -183,7 +185,7 @@ impl<'a> WallEdge<'a> {
             let third = load.difference / 3.0;
             let q = third * (p.y - base) - load.moment + load.difference * z * p.direction;
             let lift = DMat3::IDENTITY + outer(p.direction, zy);
-            let zyy = (-1.0 / c) * (lift.transpose() * self.wall.field.hessian(foot) * lift);
+            let zyy = (-1.0 / c) * (lift.transpose() * jet.hessian * lift);
             let twisted = p.twist.dot(p.ys);
             let yy = load.difference * (through * zyy + twisted * outer(zy, zy));
             let flux = third * DMat3::IDENTITY + load.difference * outer(zy, p.direction);

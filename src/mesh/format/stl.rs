@@ -1,10 +1,24 @@
 //! Binary STL.
 
 use super::{WriteError, rounded};
-use crate::{index::Id, mesh::ClosedMesh};
+use crate::{
+    index::{Id, checked_u32},
+    mesh::{ClosedMesh, VertexId},
+};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::io::Write;
 use stl_io::{Normal, Triangle, Vertex};
+
+/// Triangles that are packed by one thread in a row; what is packed and not yet written is bounded by a few times 50 bytes
+/// of each.
+const CHUNK: usize = 1 << 15;
+
+/// Chunks packed before they are written.
+const CHUNKS_AT_A_TIME: usize = 8;
+
+/// The header that `stl_io` writes, with the number of triangles.
+const HEADER_BYTES: usize = 84;
 
 /// Writes binary STL: single precision, normals from the corners, nothing in the header.
 ///
@@ -13,13 +27,31 @@ use stl_io::{Normal, Triangle, Vertex};
 pub fn write_stl(mesh: &ClosedMesh, writer: &mut impl Write) -> Result<(), WriteError> {
     let mesh = mesh.mesh();
     let places = rounded(mesh, |p| p)?;
-    let triangles = mesh.triangles.iter().map(|triangle| {
+    let count = checked_u32(mesh.triangles.len());
+    let mut header = [0; HEADER_BYTES];
+    header[HEADER_BYTES - 4..].copy_from_slice(&count.to_le_bytes());
+    writer.write_all(&header)?;
+    for chunks in mesh.triangles.chunks(CHUNK * CHUNKS_AT_A_TIME) {
+        let packed: Vec<Vec<u8>> =
+            chunks.par_chunks(CHUNK).map(|chunk| packed(&places, chunk)).collect::<Result<_, _>>()?;
+        for bytes in packed {
+            writer.write_all(&bytes[HEADER_BYTES..])?;
+        }
+    }
+    Ok(())
+}
+
+/// Some triangles as a whole STL file of their own.
+fn packed(places: &[[f32; 3]], triangles: &[[VertexId; 3]]) -> Result<Vec<u8>, WriteError> {
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + 50 * triangles.len());
+    let triangles = triangles.iter().map(|triangle| {
         let corners = triangle.map(|v| places[v.index()]);
         let [a, b, c] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
         let normal = super::single((b - a).cross(c - a).normalize_or_zero());
         Triangle { normal: Normal::new(normal), vertices: corners.map(Vertex::new) }
     });
-    Ok(stl_io::write_stl(writer, triangles)?)
+    stl_io::write_stl(&mut bytes, triangles)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]
