@@ -1,5 +1,7 @@
 //! Single bubbles against exact and independently measured figures.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail by a panic, too")]
+
 use combwright::{
     foam::{
         bubble::{Chart, Meshes, NoBubble, ThinGap, held, landing, settled},

@@ -1,11 +1,13 @@
 //! Foams of two layers against their derivation and Plateau's laws.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail by a panic, too")]
+
 use combwright::foam::{
     layers::{
         Arrangement, Division, Layers, NoLayers, corner_angles, layer_figures, plane_end, relaxed, sheets,
         tetrahedral_angle,
     },
-    relax::Ending,
+    relax::{DescentStep, Ending},
     setup::FoamSpace,
 };
 use std::ops::ControlFlow;
@@ -23,7 +25,7 @@ fn flat(arrangement: Arrangement, fineness: usize) -> Result<(Layers, f64), NoLa
     let sheets = sheets(&space(), &gap, arrangement, CELLS, 1, &mut |_| ControlFlow::Continue(()))?;
     let domain = space().domain().unwrap();
     let division = Division::new(&gap, &domain, &sheets.seeds, sheets.lower, sheets.spacing)?;
-    let go_on = &mut |_: &_| ControlFlow::Continue(());
+    let go_on = &mut |_: &DescentStep<'_>| ControlFlow::Continue(());
     Ok((relaxed(division, &gap, fineness, sheets.spacing, 1e-10, go_on)?, sheets.spacing))
 }
 

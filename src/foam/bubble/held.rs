@@ -172,7 +172,7 @@ pub(super) fn first_radius(chart: &Chart<'_>, volume: f64) -> Result<f64, NoBubb
     for _ in 0..RADIUS_STEPS {
         let sheet = Sheet::round(chart, mesh, radius, volume)?;
         let ratio = (volume / sheet.volume_at(&sheet.places)).sqrt();
-        if !(ratio > 0.0) {
+        if ratio.is_nan() || ratio <= 0.0 {
             return Err(NoBubble::Wide { place: chart.place() });
         }
         radius *= ratio.clamp(0.5, 2.0);
