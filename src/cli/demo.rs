@@ -216,6 +216,7 @@ impl<'a> Demo<'a> {
             last_stage: Stage::Foam,
             runs: 1,
             jobs: None,
+            write_fe: None,
             output: PathBuf::new(),
         }
     }

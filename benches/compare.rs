@@ -1,7 +1,7 @@
 //! How honest the comparison is: its level on true nulls, and its power against a difference of five points in the share of
 //! hexagons.
 //!
-//! `cargo run --example compare_study -- FOLDER` prints both as tables and draws the power into FOLDER as `compare_power.svg`
+//! `cargo bench --bench compare -- FOLDER` prints both as tables and draws the power into FOLDER as `compare_power.svg`
 //! and `.png`. It takes about a minute on two cores.
 
 use combwright::{
@@ -21,7 +21,10 @@ const PAIRS: u64 = 1000;
 type Maker = fn(cells: usize, share: f64, seed: u64) -> Result<CellPattern, Box<dyn Error + Send + Sync>>;
 
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
-    let folder = std::env::args().nth(1).ok_or("name a folder for the figure")?;
+    let folder = std::env::args()
+        .skip(1)
+        .find(|argument| argument != "--bench")
+        .ok_or("name a folder for the figure")?;
     let makers: [(&str, Maker); 2] = [("independent cells", independent), ("5-7 pairs", flipped)];
     println!("share of {PAIRS} true nulls that are rejected at {LEVEL}, with 85 % hexagons");
     println!("{:<20} {:>6} {:>6} {:>12} {:>18}", "process", "comb", "foam", "this test", "cells shuffled");
