@@ -9,7 +9,6 @@ use crate::{
         start::start,
         volume::{Reference, volumes},
     },
-    index::Id,
     surface::{LevelSet, Plane},
 };
 use glam::DVec3;
