@@ -138,23 +138,38 @@ def write(path, cells, sides, whole):
 
 
 def agreement(cells, sides, whole, table, pitch):
-    """Cell by cell: complete ones of the program that OpenCV finds too, and those of the same count."""
-    ours = [row for row in csv.DictReader(open(table, newline="", encoding="utf-8")) if row["status"] == "complete"]
+    """Cell by cell: complete ones of the program that OpenCV finds too, and those of the same count.
+
+    Sides are compared where OpenCV has found every cell of the program around the cell, one for one: where it misses one,
+    its count says nothing of the program's.
+    """
+    rows = [row for row in csv.DictReader(open(table, newline="", encoding="utf-8")) if row["status"] != "uncertain"]
+    places = np.array([(float(row["x_px"]), float(row["y_px"])) for row in rows]).reshape(-1, 2)
     centres = np.array([c for c, _, _ in cells]).reshape(-1, 2)
-    found = compared = same = 0
-    differing = []
-    for row in ours:
-        place = np.array([float(row["x_px"]), float(row["y_px"])])
+    partner, used = {}, set()
+    for index, place in enumerate(places):
         distance = np.hypot(*(centres - place).T) if len(centres) else np.array([np.inf])
         nearest = int(distance.argmin())
-        if distance[nearest] > MATCH * pitch:
+        if distance[nearest] <= MATCH * pitch and nearest not in used:
+            partner[index] = nearest
+            used.add(nearest)
+    ours = [index for index, row in enumerate(rows) if row["status"] == "complete"]
+    compared = same = 0
+    differing = []
+    for index in ours:
+        if index not in partner:
             continue
-        found += 1
-        if whole[nearest] and cells[nearest][2]:
-            compared += 1
-            same += sides[nearest] == int(row["sides"])
-            if sides[nearest] != int(row["sides"]):
-                differing.append({"x_px": place[0], "y_px": place[1], "ours": int(row["sides"]), "opencv": sides[nearest]})
+        near = np.nonzero(np.hypot(*(places - places[index]).T) < 1.6 * pitch)[0]
+        mate = partner[index]
+        around = np.hypot(*(centres - centres[mate]).T) < 1.6 * pitch
+        if not whole[mate] or not cells[mate][2] or any(n not in partner for n in near) or around.sum() != len(near):
+            continue
+        compared += 1
+        count = int(rows[index]["sides"])
+        same += sides[mate] == count
+        if sides[mate] != count:
+            differing.append({"x_px": places[index][0], "y_px": places[index][1], "ours": count, "opencv": sides[mate]})
+    found = sum(index in partner for index in ours)
     return {
         "complete_cells": len(ours),
         "found_by_opencv": found,

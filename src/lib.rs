@@ -13,6 +13,7 @@
 //! | [`foam`] | the ideal foam between two walls: seeds, partition, relaxed films |
 //! | [`tessellation`] | who touches whom, sides, defects, distributions |
 //! | [`compare`] | comb against foam, with its uncertainty |
+//! | [`projection`] | between a flat photograph and the curved wall that it shows |
 //! | [`report`] | tables, figures, files |
 //!
 //! The library prints nothing. The program `combwright` is built with the feature `cli`.
@@ -20,9 +21,11 @@
 pub mod comb;
 pub mod compare;
 pub mod enclosure;
+pub mod evolver;
 pub mod foam;
 pub mod index;
 pub mod mesh;
+pub mod projection;
 pub mod report;
 pub mod surface;
 pub mod tessellation;

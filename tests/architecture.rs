@@ -18,6 +18,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("evolver", &["index", "surface", "foam"]),
     ("comb", &["units", "index", "tessellation"]),
     ("compare", &["tessellation"]),
+    ("projection", &["units", "index", "surface", "tessellation"]),
     (
         "report",
         &[
@@ -31,6 +32,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "evolver",
             "comb",
             "compare",
+            "projection",
         ],
     ),
 ];

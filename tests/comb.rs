@@ -13,11 +13,12 @@ use std::{collections::HashMap, error::Error, fs, path::Path};
 
 type TestResult = Result<(), Box<dyn Error>>;
 
-fn settings(pitch: f64, difficulty: f64, style: Style) -> RenderSettings {
+/// About 400 cells, of 900 x 700 px at most.
+fn settings(pitch: u32, difficulty: f64, style: Style) -> RenderSettings {
     RenderSettings {
-        width: 900,
-        height: 700,
-        pitch,
+        width: (pitch * 45 / 2).min(900),
+        height: (pitch * 35 / 2).min(700),
+        pitch: f64::from(pitch),
         style,
         difficulty: Difficulty::dial(difficulty),
         torn_edge: false,
@@ -47,16 +48,16 @@ fn near(comb: &Comb, at: DVec2) -> Option<CellId> {
 /// measures more finely.
 #[test]
 fn sides_are_right_in_every_style_and_size() -> TestResult {
-    for (style, pitch) in [
-        (Style::Wax, 25.0),
-        (Style::Base, 25.0),
-        (Style::Bright, 30.0),
-        (Style::Brood, 45.0),
-        (Style::Wax, 90.0),
-    ] {
+    for (style, pitch) in
+        [(Style::Wax, 25), (Style::Base, 25), (Style::Bright, 30), (Style::Brood, 45), (Style::Wax, 90)]
+    {
         let (photo, truth) = drawn(0.6, &settings(pitch, 0.3, style));
         let comb = comb::read(&photo, &Settings::default())?;
-        assert!((comb.pitch / pitch - 1.0).abs() < 0.05, "{style:?}: pitch {} for {pitch}", comb.pitch);
+        assert!(
+            (comb.pitch / f64::from(pitch) - 1.0).abs() < 0.05,
+            "{style:?}: pitch {} for {pitch}",
+            comb.pitch
+        );
         let score = comb::score(&table(&comb)?, &truth);
         assert!(score.recall > 0.99, "{style:?} {pitch}: recall {}", score.recall);
         assert!(score.coverage > 0.9, "{style:?} {pitch}: coverage {}", score.coverage);
@@ -71,7 +72,7 @@ fn sides_are_right_in_every_style_and_size() -> TestResult {
 #[test]
 fn hexagons_have_no_defects_at_any_edge() -> TestResult {
     for torn_edge in [false, true] {
-        let mut render = settings(40.0, 0.3, Style::Wax);
+        let mut render = settings(40, 0.3, Style::Wax);
         render.torn_edge = torn_edge;
         let (photo, _) = drawn(0.0, &render);
         let comb = comb::read(&photo, &Settings::default())?;
@@ -85,7 +86,7 @@ fn hexagons_have_no_defects_at_any_edge() -> TestResult {
 
 #[test]
 fn what_a_mask_hides_gives_no_cells_and_cuts_its_neighbours() -> TestResult {
-    let (photo, _) = drawn(0.0, &settings(40.0, 0.2, Style::Wax));
+    let (photo, _) = drawn(0.0, &settings(40, 0.2, Style::Wax));
     let hidden = |x: u32, y: u32| (300..600).contains(&x) && (200..500).contains(&y);
     let mask = RgbImage::from_fn(900, 700, |x, y| image::Rgb([if hidden(x, y) { 255 } else { 0 }; 3]));
     let mask = Mask::from_picture(&Photo::from_picture(DynamicImage::ImageRgb8(mask)));
@@ -107,7 +108,7 @@ fn what_a_mask_hides_gives_no_cells_and_cuts_its_neighbours() -> TestResult {
 
 #[test]
 fn a_region_is_read_in_the_pixels_of_the_photograph() -> TestResult {
-    let (photo, _) = drawn(0.3, &settings(40.0, 0.2, Style::Wax));
+    let (photo, _) = drawn(0.3, &settings(40, 0.2, Style::Wax));
     let whole = comb::read(&photo, &Settings::default())?;
     let part = Part { left: 250, top: 150, width: 500, height: 450 };
     let comb = comb::read(&photo, &Settings { part: Some(part), ..Settings::default() })?;
@@ -129,7 +130,7 @@ fn a_region_is_read_in_the_pixels_of_the_photograph() -> TestResult {
 
 #[test]
 fn a_person_has_the_last_word() -> TestResult {
-    let (photo, _) = drawn(0.0, &settings(40.0, 0.2, Style::Wax));
+    let (photo, _) = drawn(0.0, &settings(40, 0.2, Style::Wax));
     let first = comb::read(&photo, &Settings::default())?;
     let Some(id) = near(&first, DVec2::new(450.0, 350.0)) else { panic!("no cells") };
     let cell = first.pattern.cells[id].clone();
@@ -145,6 +146,13 @@ fn a_person_has_the_last_word() -> TestResult {
     let joined = read(vec![Correction::Join { at, with }])?;
     assert_eq!(joined.pattern.cells.len() + 1, first.pattern.cells.len());
     assert_eq!(near(&joined, (at + with) / 2.0).and_then(|i| joined.pattern.cells[i].sides), Some(8));
+    let doubted = read(vec![Correction::Status { at, status: CellStatus::Uncertain }])?;
+    assert_eq!(near(&doubted, at).map(|i| doubted.pattern.cells[i].status), Some(CellStatus::Uncertain));
+    let gone = read(vec![Correction::Remove { at }])?;
+    assert_eq!(gone.pattern.cells.len() + 1, first.pattern.cells.len());
+    let back = read(vec![Correction::Remove { at }, Correction::Add { at }])?;
+    assert_eq!(back.pattern.cells.len(), first.pattern.cells.len());
+    assert_eq!(near(&back, at).and_then(|i| back.pattern.cells[i].sides), Some(6));
     let split = read(vec![Correction::Split { at, into: [at - DVec2::X * 9.0, at + DVec2::X * 9.0] }])?;
     assert_eq!(split.pattern.cells.len(), first.pattern.cells.len() + 1);
     let polygon =
@@ -157,7 +165,7 @@ fn a_person_has_the_last_word() -> TestResult {
 
 #[test]
 fn an_edited_table_is_read_back_and_nothing_is_lost() -> TestResult {
-    let (photo, _) = drawn(0.4, &settings(40.0, 0.3, Style::Wax));
+    let (photo, _) = drawn(0.4, &settings(40, 0.3, Style::Wax));
     let first = comb::read(&photo, &Settings::default())?;
     let mut rows = table(&first)?;
     assert!(
@@ -181,12 +189,12 @@ fn an_edited_table_is_read_back_and_nothing_is_lost() -> TestResult {
 
 #[test]
 fn threads_do_not_change_a_byte() -> TestResult {
-    let (photo, _) = drawn(0.5, &settings(30.0, 0.5, Style::Base));
+    let (photo, _) = drawn(0.5, &settings(30, 0.5, Style::Base));
     let mut tables = Vec::new();
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         let comb = pool.install(|| comb::read(&photo, &Settings::default()))?;
-        tables.push((serde_json::to_string(&comb.pattern)?, drawn(0.5, &settings(30.0, 0.5, Style::Base)).1));
+        tables.push((serde_json::to_string(&comb.pattern)?, drawn(0.5, &settings(30, 0.5, Style::Base)).1));
     }
     assert_eq!(tables[0], tables[1]);
     Ok(())
@@ -212,14 +220,14 @@ fn what_is_no_comb_is_refused() {
     ] {
         assert!(matches!(read(picture), Err(CombError::NoComb)), "{name}");
     }
-    let (small, _) = drawn(0.0, &settings(8.0, 0.0, Style::Wax));
+    let (small, _) = drawn(0.0, &settings(8, 0.0, Style::Wax));
     assert!(matches!(comb::read(&small, &Settings::default()), Err(CombError::TooFine { .. })));
 }
 
 #[test]
 fn damaged_files_are_named() -> TestResult {
     let home = tempfile::tempdir()?;
-    let (photo, _) = drawn(0.0, &settings(40.0, 0.0, Style::Wax));
+    let (photo, _) = drawn(0.0, &settings(40, 0.0, Style::Wax));
     let whole = home.path().join("whole.png");
     photo.to_rgb8().save(&whole)?;
     let bytes = fs::read(&whole)?;
@@ -239,7 +247,7 @@ fn damaged_files_are_named() -> TestResult {
 #[test]
 fn sixteen_bits_and_grey_are_read_like_eight() -> TestResult {
     let home = tempfile::tempdir()?;
-    let (photo, truth) = drawn(0.4, &settings(40.0, 0.3, Style::Wax));
+    let (photo, truth) = drawn(0.4, &settings(40, 0.3, Style::Wax));
     let eight = DynamicImage::ImageRgb8(photo.to_rgb8());
     for (name, picture) in [
         ("sixteen.png", DynamicImage::ImageRgb16(eight.to_rgb16())),
@@ -253,6 +261,53 @@ fn sixteen_bits_and_grey_are_read_like_eight() -> TestResult {
         assert!(score.recall > 0.99 && score.sides_right > 0.985, "{name}: {score:?}");
     }
     Ok(())
+}
+
+/// The picture lies on its side in the file, and the file says so: cells are where a viewer shows them.
+#[test]
+fn a_photograph_is_turned_upright_as_its_exif_says() -> TestResult {
+    let home = tempfile::tempdir()?;
+    let (photo, truth) = drawn(0.4, &settings(40, 0.2, Style::Wax));
+    let lying = image::imageops::rotate270(&photo.to_rgb8());
+    let mut jpeg = Vec::new();
+    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 92);
+    // A TIFF header and one entry: orientation (0x0112), one short, 6: to be turned by 90 degrees clockwise.
+    let orientation = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0".to_vec();
+    image::ImageEncoder::set_exif_metadata(&mut encoder, orientation)?;
+    encoder.encode_image(&lying)?;
+    let path = home.path().join("lying.jpg");
+    fs::write(&path, jpeg)?;
+    let upright = Photo::open(&path)?;
+    assert_eq!((upright.width(), upright.height()), (photo.width(), photo.height()));
+    let score = comb::score(&table(&comb::read(&upright, &Settings::default())?)?, &truth);
+    assert!(score.recall > 0.99 && score.sides_right > 0.985, "{score:?}");
+    Ok(())
+}
+
+/// The header alone tells the size: nothing of that size is held in memory.
+#[test]
+fn what_is_too_large_is_refused_before_it_is_read() -> TestResult {
+    let home = tempfile::tempdir()?;
+    let path = home.path().join("huge.png");
+    let mut bytes = Vec::new();
+    image::DynamicImage::new_luma8(1, 1)
+        .write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png)?;
+    // Width and height of the header chunk, and its checksum for 20000 x 20000 grey pixels of 8 bits.
+    let header =
+        [&b"IHDR"[..], &20_000_u32.to_be_bytes(), &20_000_u32.to_be_bytes(), &bytes[24..29]].concat();
+    bytes[12..29].copy_from_slice(&header);
+    bytes[29..33].copy_from_slice(&checksum(&header).to_be_bytes());
+    fs::write(&path, bytes)?;
+    let refused = Photo::open(&path);
+    assert!(matches!(refused, Err(PhotoError::TooLarge { width: 20_000, .. })), "{refused:?}");
+    Ok(())
+}
+
+/// The cyclic redundancy check of PNG chunks.
+fn checksum(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |sum, byte| {
+        (0..8).fold(sum ^ u32::from(*byte), |s, _| if s & 1 == 1 { 0xedb8_8320 ^ (s >> 1) } else { s >> 1 })
+    })
 }
 
 /// True centres and sides of a photograph that was checked by eye: `NAME_sides.csv`.

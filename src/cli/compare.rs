@@ -1,6 +1,10 @@
 //! `combwright compare`: patterns of comb against patterns of foam.
 
-use super::{CliError, progress::Stages};
+use super::{
+    CliError,
+    compare_wall::{self, MappedPhoto, WallArguments},
+    progress::Stages,
+};
 use crate::{
     compare::{self, CompareError, Finding, Sample, Settings, Units},
     report::{compare_files, folder::OutputFolder},
@@ -33,7 +37,9 @@ enum UnitsName {
 #[command(after_help = "Examples:
   combwright compare --comb comb/*/pattern.json --foam foam/*/pattern.json -o out
   combwright compare --comb comb/frame --foam foam-out -o out
-  combwright compare --comb a.json b.json --foam c.json --units patches --seed 7")]
+  combwright compare --comb a.json b.json --foam c.json --units patches --seed 7
+  combwright compare --comb comb/frame --recipe my.toml --marks frame-marks.csv --foam foam-out
+  combwright compare --comb comb/frame --recipe my.toml --view top --mm-per-px 0.06 --foam foam-out")]
 pub(super) struct CompareArguments {
     /// Patterns of comb: pattern.json files, or folders that hold one
     #[arg(long, required = true, num_args = 1.., value_name = "PATTERN")]
@@ -41,6 +47,8 @@ pub(super) struct CompareArguments {
     /// Patterns of foam, likewise
     #[arg(long, required = true, num_args = 1.., value_name = "PATTERN")]
     foam: Vec<PathBuf>,
+    #[command(flatten)]
+    wall: WallArguments,
     /// What is shuffled
     #[arg(long, value_enum, default_value = "auto")]
     units: UnitsName,
@@ -67,13 +75,14 @@ struct Run<'a> {
     settings: &'a Settings,
     comb: Vec<String>,
     foam: Vec<String>,
+    mapped: Vec<MappedPhoto>,
     seconds: BTreeMap<&'static str, f64>,
     ended: Finding,
 }
 
 /// Runs the command.
 pub(super) fn run(arguments: &CompareArguments) -> Result<(), CliError> {
-    let comb = read_all(&arguments.comb)?;
+    let mut comb = read_all(&arguments.comb)?;
     let foam = read_all(&arguments.foam)?;
     let settings = Settings {
         units: match arguments.units {
@@ -85,6 +94,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), CliError> {
         resamples: arguments.resamples,
         seed: arguments.seed,
     };
+    let mapped = compare_wall::map_all(&arguments.wall, &mut comb, &arguments.comb)?;
     let mut folder = OutputFolder::begin(&arguments.output)?;
     super::interrupt::remove_on_interrupt(folder.staging());
     let mut stages = Stages::new(2);
@@ -100,6 +110,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), CliError> {
         settings: &comparison.settings,
         comb: names(&arguments.comb),
         foam: names(&arguments.foam),
+        mapped,
         seconds: stages.finish(),
         ended: comparison.verdict.finding,
     };

@@ -1,6 +1,8 @@
 //! `combwright foam`: the ideal foam between two walls.
 
-use super::{CliError, foam_batch, foam_relax, foam_run, foam_settings::FoamSettings};
+use super::{
+    CliError, foam_batch, foam_bubble, foam_layers, foam_relax, foam_run, foam_settings::FoamSettings,
+};
 use crate::units::Mm;
 use std::path::PathBuf;
 
@@ -39,21 +41,9 @@ pub(super) enum StageName {
     Partition,
 }
 
-/// Seeds of a one-layer foam between two walls, and the partition of the gap into their cells.
-///
-/// Without options: one period of Schwarz' P surface between the walls Φ = ±0.2, 64 cells, seed 1. Lengths are in units of
-/// the surface (of the period L where there is one).
+/// The walls.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:
-  combwright foam --cells 256 --seed 7 -o out
-  combwright foam --surface sphere --radii 1.0,1.05 --cells 32
-  combwright foam --surface torus --tube 0.9,1.0 --ring 5
-  combwright foam --surface plane --periods 8,8 --height 0.5
-  combwright foam --recipe enclosures/paper/recipe.toml --cell-width 20mm
-  combwright foam --stop-after partition --density uniform
-  combwright foam --cells 32 --runs 100 -j 2
-  combwright foam --resume out/checkpoint -o out")]
-pub(super) struct FoamArguments {
+pub(super) struct SpaceArguments {
     /// The surface half-way between the walls
     #[arg(long, value_enum, default_value = "schwarz-p", help_heading = "Space")]
     pub(super) surface: SurfaceName,
@@ -105,6 +95,32 @@ pub(super) struct FoamArguments {
     /// The distance of the planes
     #[arg(long, value_name = "H", allow_negative_numbers = true, help_heading = "Space")]
     pub(super) height: Option<f64>,
+}
+
+/// Seeds of a one-layer foam between two walls, and the partition of the gap into their cells.
+///
+/// Without options: one period of Schwarz' P surface between the walls Φ = ±0.2, 64 cells, seed 1. Lengths are in units of
+/// the surface (of the period L where there is one).
+#[derive(Debug, clap::Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:
+  combwright foam --cells 256 --seed 7 -o out
+  combwright foam --surface sphere --radii 1.0,1.05 --cells 32
+  combwright foam --surface torus --tube 0.9,1.0 --ring 5
+  combwright foam --surface plane --periods 8,8 --height 0.5
+  combwright foam --recipe enclosures/paper/recipe.toml --cell-width 20mm
+  combwright foam --stop-after partition --density uniform
+  combwright foam --cells 32 --runs 100 -j 2
+  combwright foam --layers 2 --surface plane --periods 8,9.2376 --height 2.3 --cells 64 --pattern toth
+  combwright foam --resume out/checkpoint -o out"
+)]
+pub(super) struct FoamArguments {
+    #[command(subcommand)]
+    pub(super) part: Option<FoamPart>,
+
+    #[command(flatten)]
+    pub(super) space: SpaceArguments,
 
     /// The gap of an enclosure's recipe (TOML), one whole period of it; lengths are then in mm
     #[arg(long, value_name = "FILE", conflicts_with_all = ["surface", "period", "delta", "parallel"], help_heading = "Space")]
@@ -138,6 +154,13 @@ pub(super) struct FoamArguments {
     #[arg(long, value_name = "COUNT", default_value_t = 0, help_heading = "Cells")]
     pub(super) lloyd: usize,
 
+    /// Layers of cells: 1, or 2 as in natural comb, with --cells on each wall
+    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), conflicts_with_all = ["resume", "runs", "stop_after"], help_heading = "Layers")]
+    pub(super) layers: u8,
+    /// How the cells of two layers are arranged
+    #[arg(long, value_enum, default_value = "annealed", help_heading = "Layers")]
+    pub(super) pattern: foam_layers::PatternName,
+
     /// Quadratic elements along each film and from wall to wall [default: 2,2]
     #[arg(long, value_name = "M,K", value_delimiter = ',', help_heading = "Relaxation")]
     pub(super) elements: Option<Vec<usize>>,
@@ -157,9 +180,18 @@ pub(super) struct FoamArguments {
     /// Threads; the results do not depend on it [default: all]
     #[arg(short = 'j', long, value_name = "J", help_heading = "Run")]
     pub(super) jobs: Option<usize>,
+    /// Write the relaxed foam into the folder as a datafile of Surface Evolver, under this name
+    #[arg(long, value_name = "NAME", help_heading = "Run")]
+    pub(super) write_fe: Option<String>,
     /// The folder for the results
     #[arg(short = 'o', long, value_name = "FOLDER", default_value = "foam-out", help_heading = "Run")]
     pub(super) output: PathBuf,
+}
+
+/// Foams of a few cells.
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum FoamPart {
+    Bubble(Box<foam_bubble::BubbleArguments>),
 }
 
 /// What a checkpoint already says.
@@ -191,6 +223,9 @@ const RESUME_CONFLICTS: &[&str] = &[
 
 /// Runs the command.
 pub(super) fn foam(arguments: &FoamArguments) -> Result<(), CliError> {
+    if let Some(FoamPart::Bubble(bubble)) = &arguments.part {
+        return foam_bubble::run(bubble);
+    }
     let settings = FoamSettings::from_arguments(arguments).map_err(CliError::mistake)?;
     let resumed = arguments.resume.as_deref().map(foam_relax::read_checkpoint).transpose()?;
     let mut threads = rayon::ThreadPoolBuilder::new();
@@ -200,6 +235,9 @@ pub(super) fn foam(arguments: &FoamArguments) -> Result<(), CliError> {
     let threads = threads.build().map_err(CliError::failure)?;
     threads.install(|| match resumed {
         Some(checkpoint) => foam_relax::resume(*checkpoint, settings),
+        None if arguments.layers == 2 => {
+            foam_layers::run(&settings, arguments.pattern, arguments.elements.is_some())
+        }
         None if settings.runs > 1 => foam_batch::run(&settings),
         None => foam_run::run(&settings),
     })

@@ -7,6 +7,7 @@ use super::{
     interrupt,
 };
 use crate::{
+    evolver::write::foam_datafile,
     foam::{
         audit::{Audit, audit},
         checkpoint::{Checkpoint, StepRecord},
@@ -58,8 +59,8 @@ pub(super) struct Made {
     pub(super) relaxed: Relaxed,
     pub(super) record: Vec<StepRecord>,
     pub(super) figures: Figures,
-    pattern: CellPattern,
-    cells: CellFigures,
+    pub(super) pattern: CellPattern,
+    pub(super) cells: CellFigures,
 }
 
 /// The figures of a foam: `summary.json`.
@@ -350,6 +351,13 @@ pub(super) fn write_all(
     }
     if let Some(seeds) = seeds {
         foam_run::write_seeds(folder, seeds)?;
+    }
+    if let Some(name) = &settings.write_fe {
+        let complex = state.strips.complex(&state.network, gap);
+        let title =
+            format!("{}, N = {}, by combwright {}", job.space, made.figures.cells, env!("CARGO_PKG_VERSION"));
+        let text = foam_datafile(&job.space, &complex, &state.places, &title).map_err(CliError::mistake)?;
+        folder.write_bytes(name.as_str(), text.as_bytes())?;
     }
     folder.write_json("summary.json", &made.figures)?;
     foam_run::write_run(folder, settings, seconds, &in_words(made.figures.ended))

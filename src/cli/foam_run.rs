@@ -83,8 +83,13 @@ pub(super) fn run(settings: &FoamSettings) -> Result<(), CliError> {
 pub(super) fn finished(folder: OutputFolder, lines: Vec<Line>) -> Result<(), CliError> {
     let target = folder.target().display().to_string();
     folder.commit()?;
+    print_lines(lines.into_iter().chain([("written to", target)]))
+}
+
+/// Prints names and values in two columns.
+pub(super) fn print_lines(lines: impl IntoIterator<Item = Line>) -> Result<(), CliError> {
     let mut text = String::new();
-    for (name, value) in lines.into_iter().chain([("written to", target)]) {
+    for (name, value) in lines {
         // Writing to a string does not fail.
         let _ = writeln!(text, "{name:<24}{value}");
     }

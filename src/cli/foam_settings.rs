@@ -1,6 +1,6 @@
 //! From what was typed about a foam to what is meant, with all faults at once.
 
-use super::foam::{DensityName, FoamArguments, StageName, SurfaceName};
+use super::foam::{DensityName, FoamArguments, SpaceArguments, StageName, SurfaceName};
 use crate::foam::{
     complex::Strips,
     relax::RelaxSettings,
@@ -56,12 +56,14 @@ pub(super) struct FoamSettings {
     #[serde(skip)]
     pub(super) jobs: Option<usize>,
     #[serde(skip)]
+    pub(super) write_fe: Option<String>,
+    #[serde(skip)]
     pub(super) output: PathBuf,
 }
 
 /// Everything that is wrong with what was typed.
 #[derive(Debug)]
-pub(super) struct Faults(Vec<String>);
+pub(super) struct Faults(pub(super) Vec<String>);
 
 impl fmt::Display for Faults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -80,10 +82,10 @@ impl std::error::Error for Faults {}
 impl FoamSettings {
     /// The settings that the arguments mean.
     pub(super) fn from_arguments(arguments: &FoamArguments) -> Result<Self, Faults> {
-        let mut faults = unused(arguments);
+        let mut faults = unused(&arguments.space);
         let space = match &arguments.recipe {
             Some(file) => recipe_space(file).map_err(|fault| Faults(vec![fault]))?,
-            None => space(arguments, &mut faults),
+            None => space(&arguments.space, &mut faults),
         };
         let mut cells = arguments.cells.unwrap_or(DEFAULT_CELLS);
         match space.gap() {
@@ -114,6 +116,7 @@ impl FoamSettings {
             last_stage,
             runs: arguments.runs,
             jobs: arguments.jobs,
+            write_fe: arguments.write_fe.clone(),
             output: arguments.output.clone(),
         })
     }
@@ -170,13 +173,18 @@ fn recipe_space(file: &Path) -> Result<FoamSpace, String> {
     let text = fs::read_to_string(file).map_err(|error| named(&error))?;
     let recipe = Recipe::parse(&text).map_err(|error| named(&error))?;
     let design = Design::new(&recipe).map_err(|error| named(&error))?;
+    Ok(space_of(&design))
+}
+
+/// One whole period of a design's gap, in mm.
+pub(super) fn space_of(design: &Design) -> FoamSpace {
     let [lower, upper] = design.gap.walls();
     let period = design.period.0;
     let walls = match design.gap.kind() {
         GapKind::LevelSet => PeriodicWalls::LevelSet { delta: upper.level },
         GapKind::Parallel => PeriodicWalls::Parallel { gap: (upper.level - lower.level) * period },
     };
-    Ok(FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period, walls })
+    FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period, walls }
 }
 
 /// How many hexagons of this width cover the middle surface.
@@ -197,7 +205,7 @@ fn cells_of_width(gap: &Gap, width: Mm, faults: &mut Vec<String>) -> usize {
 }
 
 /// The space that was meant; missing and malformed numbers become faults.
-fn space(arguments: &FoamArguments, faults: &mut Vec<String>) -> FoamSpace {
+pub(super) fn space(arguments: &SpaceArguments, faults: &mut Vec<String>) -> FoamSpace {
     match arguments.surface {
         SurfaceName::SchwarzP => periodic(arguments, PeriodicSurface::SchwarzP),
         SurfaceName::Gyroid => periodic(arguments, PeriodicSurface::Gyroid),
@@ -216,7 +224,7 @@ fn space(arguments: &FoamArguments, faults: &mut Vec<String>) -> FoamSpace {
     }
 }
 
-fn periodic(arguments: &FoamArguments, kind: PeriodicSurface) -> FoamSpace {
+fn periodic(arguments: &SpaceArguments, kind: PeriodicSurface) -> FoamSpace {
     let walls = match arguments.parallel {
         Some(gap) => PeriodicWalls::Parallel { gap },
         None => PeriodicWalls::LevelSet { delta: arguments.delta.unwrap_or(0.2) },
@@ -246,7 +254,7 @@ fn pair(option: &str, values: Option<&[f64]>, faults: &mut Vec<String>) -> [f64;
 }
 
 /// Options that the chosen surface does not have: better said than ignored.
-fn unused(arguments: &FoamArguments) -> Vec<String> {
+pub(super) fn unused(arguments: &SpaceArguments) -> Vec<String> {
     let kind = match arguments.surface {
         SurfaceName::SchwarzP | SurfaceName::Gyroid | SurfaceName::Diamond => "a triply periodic surface",
         SurfaceName::Sphere => "a sphere",

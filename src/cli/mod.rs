@@ -7,9 +7,12 @@
 //! |---|---|
 //! | `enclosure` | `enclosure.rs` |
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
+//! | `foam bubble`, `foam --layers 2` | `foam_bubble.rs`, `foam_layers.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
+//! | `evolver check`, `evolver run` | `evolver.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
-//! | `compare` | `compare.rs` |
+//! | `compare` | `compare.rs`, `compare_wall.rs` |
+//! | `demo`, `view` | `demo.rs`, `demo_comb.rs`, `view.rs` |
 //! | shell completions, manual page | `manual.rs` |
 
 // Printing is this room's job.
@@ -19,9 +22,15 @@ mod comb;
 mod comb_render;
 mod comb_score;
 mod compare;
+mod compare_wall;
+mod demo;
+mod demo_comb;
 mod enclosure;
+mod evolver;
 mod foam;
 mod foam_batch;
+mod foam_bubble;
+mod foam_layers;
 mod foam_relax;
 mod foam_run;
 mod foam_settings;
@@ -29,6 +38,7 @@ mod interrupt;
 mod manual;
 mod outcome;
 mod progress;
+mod view;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
@@ -51,7 +61,11 @@ enum Command {
     Foam(Box<foam::FoamArguments>),
     /// Read the cells of comb and their numbers of sides from photographs
     Comb(Box<comb::CombArguments>),
+    /// Read, check and run datafiles of Surface Evolver
+    Evolver(evolver::EvolverArguments),
     Compare(compare::CompareArguments),
+    Demo(demo::DemoArguments),
+    View(view::ViewArguments),
     /// Print a completion script for a shell to stdout
     Completions(manual::CompletionArguments),
     /// Print the manual page (roff) to stdout
@@ -66,7 +80,10 @@ pub fn main() -> ExitCode {
         Command::Enclosure(arguments) => enclosure::run(&arguments),
         Command::Foam(foam) => foam::foam(&foam),
         Command::Comb(comb) => comb::run(&comb),
+        Command::Evolver(arguments) => evolver::run(&arguments),
         Command::Compare(compare) => compare::run(&compare),
+        Command::Demo(demo) => demo::run(&demo),
+        Command::View(view) => view::run(&view),
         Command::Completions(shell) => manual::completions(&shell, Arguments::command()),
         Command::Man => manual::page(Arguments::command()),
     };

@@ -26,7 +26,14 @@ impl CliError {
 impl fmt::Display for CliError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (Self::Mistake(error) | Self::Failure(error)) = self;
-        write!(f, "{error:#}")
+        // Errors of the library tell their cause in their own text; only what is not told yet is added.
+        let mut told = error.to_string();
+        for cause in error.chain().skip(1).map(ToString::to_string) {
+            if !told.contains(&cause) {
+                told = format!("{told}: {cause}");
+            }
+        }
+        f.write_str(&told)
     }
 }
 
@@ -62,5 +69,20 @@ pub(super) fn exit_code(ended: Result<(), CliError>) -> ExitCode {
                 CliError::Failure(_) => ExitCode::from(1),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::WriteError;
+
+    #[test]
+    fn a_cause_is_told_once() {
+        let disk = || std::io::Error::other("no space");
+        let nested =
+            CliError::failure(anyhow::Error::new(WriteError::Io(disk())).context("cannot write a.stl"));
+        assert_eq!(nested.to_string(), "cannot write a.stl: cannot write the mesh: no space");
+        assert_eq!(CliError::failure(WriteError::Io(disk())).to_string(), "cannot write the mesh: no space");
     }
 }

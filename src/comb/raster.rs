@@ -8,6 +8,8 @@ use super::{
     photo::{Part, Photo, Samples},
     plane::{Plane, narrow, pixel},
 };
+use image::RgbImage;
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Halvings that are kept: the coarsest level has a pixel per 32 x 32 of the photograph.
@@ -87,29 +89,45 @@ impl Raster<'_> {
 
     /// The value of every pixel's colour: red, green and blue in 0..=1 as stored (not linearised).
     pub(crate) fn plane(&self, value: impl Fn([f32; 3]) -> f32 + Sync) -> Plane {
-        let range = self.columns.range();
         let mut plane = Plane::new(self.width(), self.height(), 0.0);
-        plane.fill_rows_with(
-            || vec![0.0_f32; range.len() * 3],
-            |sums, y, out| {
-                sums.fill(0.0);
-                for (row, weight) in self.rows.of(y) {
-                    match self.photo.row(row, range.clone()) {
-                        Samples::Eight(row) => add(sums, row, weight / f32::from(u8::MAX)),
-                        Samples::Sixteen(row) => add(sums, row, weight / f32::from(u16::MAX)),
-                    }
-                }
-                for (x, v) in out.iter_mut().enumerate() {
-                    let mut colour = [0.0; 3];
-                    for (column, weight) in self.columns.of(x) {
-                        let at = 3 * (column - range.start);
-                        colour.iter_mut().zip(&sums[at..at + 3]).for_each(|(c, s)| *c += weight * s);
-                    }
-                    *v = value(colour);
-                }
-            },
-        );
+        plane.fill_rows_with(Vec::new, |sums, y, out| {
+            out.iter_mut().zip(self.row(y, sums)).for_each(|(v, colour)| *v = value(colour));
+        });
         plane
+    }
+
+    /// The picture in 8 bits, row by row.
+    fn bytes(&self) -> Vec<u8> {
+        let mut bytes = vec![0; 3 * self.width() * self.height()];
+        let rows = bytes.par_chunks_mut((3 * self.width()).max(1)).enumerate();
+        rows.for_each_init(Vec::new, |sums, (y, out)| {
+            for (pixel, colour) in out.chunks_exact_mut(3).zip(self.row(y, sums)) {
+                pixel.iter_mut().zip(colour).for_each(|(v, c)| *v = byte(c));
+            }
+        });
+        bytes
+    }
+
+    /// The colours of a row; `sums` is working space.
+    fn row(&self, y: usize, sums: &mut Vec<f32>) -> impl Iterator<Item = [f32; 3]> {
+        let range = self.columns.range();
+        sums.clear();
+        sums.resize(3 * range.len(), 0.0);
+        for (row, weight) in self.rows.of(y) {
+            match self.photo.row(row, range.clone()) {
+                Samples::Eight(row) => add(sums, row, weight / f32::from(u8::MAX)),
+                Samples::Sixteen(row) => add(sums, row, weight / f32::from(u16::MAX)),
+            }
+        }
+        let sums = &*sums;
+        (0..self.width()).map(move |x| {
+            let mut colour = [0.0; 3];
+            for (column, weight) in self.columns.of(x) {
+                let at = 3 * (column - range.start);
+                colour.iter_mut().zip(&sums[at..at + 3]).for_each(|(c, s)| *c += weight * s);
+            }
+            colour
+        })
     }
 
     /// The mean of the three channels.
@@ -132,6 +150,25 @@ impl Raster<'_> {
         }
         colour
     }
+}
+
+impl Photo {
+    /// The photograph as 8-bit colours at another size, to be drawn on.
+    #[must_use]
+    pub fn scaled(&self, width: u32, height: u32) -> RgbImage {
+        let whole = Part { left: 0, top: 0, width: self.width(), height: self.height() };
+        if (width as usize, height as usize) == (whole.width, whole.height) {
+            return self.to_rgb8();
+        }
+        let pyramid = Pyramid::of(self, whole);
+        let bytes = pyramid.raster(whole, width as usize, height as usize).bytes();
+        RgbImage::from_raw(width, height, bytes).unwrap_or_default()
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before the cast")]
+fn byte(value: f32) -> u8 {
+    (value * 255.0 + 0.5).clamp(0.0, 255.0) as u8
 }
 
 fn add<T: Copy + Into<f32>>(sums: &mut [f32], row: &[T], weight: f32) {

@@ -15,7 +15,7 @@ use super::{
     watershed::{self, Segmentation},
 };
 use glam::DVec2;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::RangeInclusive};
 
 /// Pixels per pitch that the reading works at: larger photographs are reduced to it. At 36 a wall of a tenth of the pitch
 /// is 3 to 4 pixels long, which is enough to see it; more costs time and shows more of the wax's grain.
@@ -34,8 +34,11 @@ const RELIEF_BLUR: f64 = 0.03;
 const HALVES_RISE: f64 = 0.55;
 const HALVES_AREA: f64 = 1.65;
 const HALVES_DISTANCE: f64 = 0.78;
-/// An inferred place with less than this share of a cell's area is a corner of another one's cell.
-const CORNER_AREA: f64 = 0.2;
+/// An inferred place is a corner of another one's cell behind no more than a sunken wall: less than this share of a cell,
+/// together with the other about one cell, and a wall of no more than this share of the usual rise.
+const CORNER_AREA: f64 = 0.45;
+const CORNER_TOTAL: RangeInclusive<f64> = 0.8..=1.4;
+const CORNER_RISE: f64 = 0.8;
 
 /// A cell that the border cuts is a sliver if less than this share of its outline is seen.
 const HALF_SEEN: f64 = 0.5;
@@ -154,7 +157,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let reaches: Vec<f64> = pitches.iter().map(|p| watershed::REACH * p).collect();
     let regions = walls::regions(&first, &relief, &centres, &pitches, &reaches);
     for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
-        if site.depth == 0 && region.area > 0.0 && region.on_border == 0 {
+        if site.depth == 0 && region.area > 0.0 && !region.on_border {
             *centre = region.centroid;
         }
     }
@@ -186,7 +189,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let centres = regions
         .iter()
         .zip(&markers)
-        .map(|(r, m)| if r.area > 0.0 && r.on_border == 0 { r.centroid } else { *m })
+        .map(|(r, m)| if r.area > 0.0 && !r.on_border { r.centroid } else { *m })
         .collect();
     Segmented { segmentation, relief, centres, markers, by_hand, pitches, regions, walls }
 }
@@ -211,17 +214,19 @@ fn halves(
         let (a, b) = *pair;
         let pitch = (pitches[a] + pitches[b]) / 2.0;
         let cell = pitch * pitch * 0.75_f64.sqrt();
-        let corner = |i: usize| {
-            sites[i].depth > 0 && regions[i].area < CORNER_AREA * cell && regions[i].on_border == 0
-        };
+        let corner =
+            |i: usize| sites[i].depth > 0 && regions[i].area < CORNER_AREA * cell && !regions[i].on_border;
         let halves = match (found(a), found(b)) {
             (true, true) => wall.length > 0.3 * pitch,
             (true, false) => corner(b),
             (false, true) => corner(a),
             (false, false) => false,
         };
-        let open = rise(*pair, wall) < HALVES_RISE * typical;
-        let sized = regions[a].area + regions[b].area < HALVES_AREA * cell;
+        let both = found(a) && found(b);
+        let (rise_limit, total) =
+            if both { (HALVES_RISE, 0.0..=HALVES_AREA) } else { (CORNER_RISE, CORNER_TOTAL) };
+        let open = rise(*pair, wall) < rise_limit * typical;
+        let sized = total.contains(&((regions[a].area + regions[b].area) / cell));
         let close = regions[a].centroid.distance(regions[b].centroid) < HALVES_DISTANCE * pitch;
         if halves && open && sized && close && !joined[a] && !joined[b] {
             let (kept, gone) = if found(a) { (a, b) } else { (b, a) };
@@ -241,7 +246,7 @@ fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
     let cut: Vec<bool> = regions
         .iter()
         .zip(&evidence)
-        .map(|(r, e)| r.area == 0.0 || (r.on_border > 0 && e.visible < 1.0) || r.on_nothing > 0)
+        .map(|(r, e)| r.area == 0.0 || (r.on_border && e.visible < 1.0) || r.on_nothing)
         .collect();
     let whole: Vec<bool> = cut.iter().map(|c| !c).collect();
     let mut kinds = kinds::classify(&centres, &pitches, &evidence, &whole);

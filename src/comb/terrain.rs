@@ -29,7 +29,7 @@ pub(crate) struct Tile {
     pub(crate) rows: Range<usize>,
 }
 
-/// Heights of a tile, row by row, as levels in `0..LEVELS`; `pitch` in pixels.
+/// Heights of a tile with a frame of one pixel around it, row by row, as levels in `0..LEVELS`; `pitch` in pixels.
 pub(crate) fn levels(relief: &Plane, tile: &Tile, pitch: f64) -> Vec<u16> {
     let width = tile.columns.len();
     let farthest = pixel((FARTHEST * pitch).ceil(), usize::from(u16::MAX));
@@ -38,15 +38,16 @@ pub(crate) fn levels(relief: &Plane, tile: &Tile, pitch: f64) -> Vec<u16> {
     let highest = WALL_LEVEL + slope * narrow(farthest as f64);
     let unit = narrow((LEVELS - 1) as f64) / (highest + GLINT);
     let level = |height: f32| quantised((height + GLINT) * unit);
-    let mut levels = vec![0; width * tile.rows.len()];
-    for (y, (out, down)) in tile.rows.clone().zip(levels.chunks_mut(width).zip(down.chunks(width))) {
+    let mut levels = vec![0; (width + 2) * (tile.rows.len() + 2)];
+    let inner = levels.chunks_mut(width + 2).skip(1).map(|row| &mut row[1..=width]);
+    for (y, (out, down)) in tile.rows.clone().zip(inner.zip(down.chunks(width))) {
         let row = &relief.row(y)[tile.columns.clone()];
-        for ((v, r), d) in out.iter_mut().zip(row).zip(down) {
-            *v = if *d == 0 { level(*r) } else { 0 };
+        for (v, r) in out.iter_mut().zip(row) {
+            *v = level(*r);
         }
         let mut x = 0;
         while x < width {
-            let end = (x..width).find(|k| down[*k] == 0).unwrap_or(width);
+            let end = down[x..].iter().position(|d| *d == 0).map_or(width, |run| x + run);
             for place in x..end {
                 let squared = nearest(down, x..end, place, farthest);
                 out[place] = level(WALL_LEVEL + slope * narrow(f64::from(squared).sqrt()));

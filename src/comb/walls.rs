@@ -20,10 +20,10 @@ pub(crate) struct Region {
     pub(crate) centroid: DVec2,
     /// Mean relief of the inner part.
     pub(crate) inside: f64,
-    /// Pixel edges that lie on the border of the raster.
-    pub(crate) on_border: usize,
-    /// Pixel edges towards pixels of no cell.
-    pub(crate) on_nothing: usize,
+    /// Whether it meets the border of the raster.
+    pub(crate) on_border: bool,
+    /// Whether it meets pixels of no cell.
+    pub(crate) on_nothing: bool,
     /// The columns and rows that hold it.
     frame: [Range<usize>; 2],
 }
@@ -63,36 +63,34 @@ fn region(segmentation: &Segmentation, cell: usize, marker: DVec2, reach: f64) -
     let (width, height) = (segmentation.width, segmentation.height);
     let around = |at: f64, size: usize| pixel(at - reach - 1.0, size)..pixel(at + reach + 1.0, size) + 1;
     let label = crate::index::checked_u32(cell);
-    let mut region = Region {
-        area: 0.0,
-        centroid: DVec2::ZERO,
-        inside: 0.0,
-        on_border: 0,
-        on_nothing: 0,
-        frame: [width..0, height..0],
-    };
-    let (columns, rows) = (around(marker.x, width), around(marker.y, height));
-    for y in rows {
-        for x in columns.clone() {
-            if segmentation.at(x, y) != label {
-                continue;
-            }
-            region.area += 1.0;
-            region.centroid += DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            let [across, down] = &mut region.frame;
-            *across = across.start.min(x)..across.end.max(x + 1);
-            *down = down.start.min(y)..down.end.max(y + 1);
-            region.on_border += usize::from(x == 0)
-                + usize::from(y == 0)
-                + usize::from(x + 1 == width)
-                + usize::from(y + 1 == height);
-            region.on_nothing += beside(x, y, width, height)
-                .filter(|(u, v)| segmentation.at(*u, *v) == Segmentation::NONE)
-                .count();
+    let (mut area, mut sum, mut on_nothing) = (0_usize, [0_usize; 2], false);
+    let (mut across, mut down) = (width..0, height..0);
+    let columns = around(marker.x, width);
+    for y in around(marker.y, height) {
+        let mut count = 0;
+        for x in segmentation.places(label, y, columns.clone()) {
+            count += 1;
+            sum[0] += x;
+            across = across.start.min(x)..across.end.max(x + 1);
+            on_nothing = on_nothing
+                || beside(x, y, width, height).any(|(u, v)| segmentation.at(u, v) == Segmentation::NONE);
+        }
+        if count > 0 {
+            area += count;
+            sum[1] += count * y;
+            down = down.start.min(y)..y + 1;
         }
     }
-    region.centroid = if region.area > 0.0 { region.centroid / region.area } else { marker };
-    region
+    let centroid = DVec2::new(sum[0] as f64, sum[1] as f64) / area as f64 + 0.5;
+    let on_border = across.start == 0 || down.start == 0 || across.end == width || down.end == height;
+    Region {
+        area: area as f64,
+        centroid: if area > 0 { centroid } else { marker },
+        inside: 0.0,
+        on_border,
+        on_nothing,
+        frame: [across, down],
+    }
 }
 
 /// The pixels beside a pixel that exist.
@@ -140,7 +138,7 @@ fn walls_of(
     let mut gathered: Vec<Gathered> = Vec::new();
     let [columns, rows] = regions[cell].frame.clone();
     for y in rows {
-        for x in columns.clone().filter(|x| segmentation.at(*x, y) == label) {
+        for x in segmentation.places(label, y, columns.clone()) {
             for (u, v) in beside(x, y, width, height) {
                 let other = segmentation.at(u, v);
                 if other <= label || other == Segmentation::NONE {

@@ -18,12 +18,13 @@ use std::ops::Range;
 const MARKER_RADIUS: f64 = 0.16;
 /// A cell ends this far from its marker, in pitches: corners of a regular cell are at 0.58.
 pub(crate) const REACH: f64 = 0.95;
-/// Longest edge of a tile in pixels, without its margin.
-const TILE: usize = 1536;
-/// Overlap of tiles, in pitches: the reach of a cell and of the neighbours that it competes with.
-const MARGIN: f64 = 2.0;
-/// A pixel that nothing has flooded yet.
-const DRY: u32 = Segmentation::NONE - 1;
+/// Longest edge of a tile in pixels, without its margin: such a tile stays in a processor's cache.
+const TILE: usize = 448;
+/// Overlap of tiles, in pitches: the reach of a cell and the radius of a marker.
+const MARGIN: f64 = 1.2;
+/// A pixel that nothing has flooded yet, and one that nothing can flood.
+const DRY: u16 = u16::MAX - 1;
+const BARRIER: u16 = u16::MAX;
 
 /// Which cell each pixel belongs to.
 #[derive(Clone, Debug)]
@@ -60,6 +61,18 @@ impl Segmentation {
         for label in self.labels.iter_mut().filter(|l| **l != Self::NONE) {
             *label = crate::index::checked_u32(into[*label as usize]);
         }
+    }
+
+    /// Which of the `columns` of row `y` have a label.
+    pub(crate) fn places(
+        &self,
+        label: u32,
+        y: usize,
+        columns: Range<usize>,
+    ) -> impl Iterator<Item = usize> + use<'_> {
+        let first = columns.start;
+        let row = &self.labels[y * self.width..(y + 1) * self.width][columns];
+        row.iter().enumerate().filter(move |(_, l)| **l == label).map(move |(x, _)| first + x)
     }
 
     /// The label of a pixel.
@@ -130,73 +143,87 @@ struct Ground<'a> {
     pitch: f64,
 }
 
+/// A marker that reaches into a tile, in pixels of the tile with its frame.
+struct Source {
+    label: u32,
+    centre: DVec2,
+    squared_reach: f64,
+}
+
+/// A pixel of a tile with its frame: column and row.
+type Pixel = [u16; 2];
+
 impl Ground<'_> {
-    /// Labels of a tile's pixels with a frame of one pixel around them, hidden pixels and frame as [`Segmentation::NONE`].
+    /// Labels of a tile's pixels with a frame of one pixel around them; hidden pixels and the frame are
+    /// [`Segmentation::NONE`].
     fn flood(&self, tile: &Tile) -> Vec<u32> {
+        let stride = tile.columns.len() + 2;
         let levels = terrain::levels(self.relief, tile, self.pitch);
-        let (width, stride) = (tile.columns.len(), tile.columns.len() + 2);
-        let mut labels = self.dry(tile);
-        let corner = DVec2::new(tile.columns.start as f64, tile.rows.start as f64) - 1.0;
-        let mut buckets: Vec<Vec<usize>> = vec![Vec::new(); LEVELS];
-        self.mark(tile, corner, &mut labels, &mut buckets[0]);
+        let mut owners = self.dry(tile);
+        let mut buckets: Vec<Vec<Pixel>> = vec![Vec::new(); LEVELS];
+        let sources = self.mark(tile, &mut owners, &mut buckets[0]);
         for level in 0..LEVELS {
             let mut next = 0;
-            while let Some(&index) = buckets[level].get(next) {
+            while let Some(&[x, y]) = buckets[level].get(next) {
                 next += 1;
-                let label = labels[index];
-                let (centre, pitch) = (self.markers[label as usize] - corner, self.pitches[label as usize]);
-                let reach = REACH * pitch;
-                for beside in [index - stride, index - 1, index + 1, index + stride] {
-                    if labels[beside] != DRY {
+                let owner = owners[usize::from(y) * stride + usize::from(x)];
+                let source = &sources[usize::from(owner)];
+                for [x, y] in [[x, y - 1], [x - 1, y], [x + 1, y], [x, y + 1]] {
+                    let beside = usize::from(y) * stride + usize::from(x);
+                    if owners[beside] != DRY {
                         continue;
                     }
-                    let (x, y) = (beside % stride, beside / stride);
-                    let place = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-                    if place.distance_squared(centre) < reach * reach {
-                        labels[beside] = label;
-                        let height = usize::from(levels[(y - 1) * width + x - 1]);
-                        buckets[height.max(level)].push(beside);
+                    let place = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    if place.distance_squared(source.centre) < source.squared_reach {
+                        owners[beside] = owner;
+                        buckets[usize::from(levels[beside]).max(level)].push([x, y]);
                     }
                 }
             }
             buckets[level] = Vec::new();
         }
-        labels.iter_mut().filter(|l| **l == DRY).for_each(|l| *l = Segmentation::NONE);
-        labels
+        let label = |owner: &u16| sources.get(usize::from(*owner)).map_or(Segmentation::NONE, |s| s.label);
+        owners.iter().map(label).collect()
     }
 
-    /// A tile that nothing has flooded yet.
-    fn dry(&self, tile: &Tile) -> Vec<u32> {
+    /// A tile that nothing has flooded yet, in a frame that nothing can flood.
+    fn dry(&self, tile: &Tile) -> Vec<u16> {
         let stride = tile.columns.len() + 2;
-        let mut labels = vec![Segmentation::NONE; stride * (tile.rows.len() + 2)];
-        for (y, row) in tile.rows.clone().zip(labels.chunks_mut(stride).skip(1)) {
-            for (x, label) in tile.columns.clone().zip(&mut row[1..]) {
+        let mut owners = vec![BARRIER; stride * (tile.rows.len() + 2)];
+        for (y, row) in tile.rows.clone().zip(owners.chunks_mut(stride).skip(1)) {
+            for (x, owner) in tile.columns.clone().zip(&mut row[1..]) {
                 if !self.hidden.is_some_and(|h| h[y * self.relief.width() + x]) {
-                    *label = DRY;
+                    *owner = DRY;
                 }
             }
         }
-        labels
+        owners
     }
 
-    /// Labels the markers' discs within a tile and lists their pixels.
-    fn mark(&self, tile: &Tile, corner: DVec2, labels: &mut [u32], wet: &mut Vec<usize>) {
+    /// Gives the discs of the markers that reach into a tile to them, and lists the discs' pixels.
+    fn mark(&self, tile: &Tile, owners: &mut [u16], wet: &mut Vec<Pixel>) -> Vec<Source> {
         let (width, height) = (tile.columns.len(), tile.rows.len());
+        let corner = DVec2::new(tile.columns.start as f64, tile.rows.start as f64);
         let limit = DVec2::new(width as f64, height as f64);
+        let mut sources = Vec::new();
         for (label, (centre, pitch)) in self.markers.iter().zip(self.pitches).enumerate() {
-            let at = *centre - corner - 1.0;
-            let radius = MARKER_RADIUS * pitch;
+            let (at, radius) = (*centre - corner, MARKER_RADIUS * pitch);
             if at.cmplt(DVec2::splat(-radius)).any() || at.cmpgt(limit + radius).any() {
                 continue;
             }
+            let owner = u16::try_from(sources.len()).unwrap_or(BARRIER);
+            let label = crate::index::checked_u32(label);
+            sources.push(Source { label, centre: at + 1.0, squared_reach: (REACH * pitch).powi(2) });
             for index in disc(at, radius, width, height) {
-                let index = (index / width + 1) * (width + 2) + index % width + 1;
-                if labels[index] == DRY {
-                    labels[index] = crate::index::checked_u32(label);
-                    wet.push(index);
+                let (x, y) = (index % width + 1, index / width + 1);
+                let place = y * (width + 2) + x;
+                if owners[place] == DRY {
+                    owners[place] = owner;
+                    wet.extend(u16::try_from(x).ok().zip(u16::try_from(y).ok()).map(|(x, y)| [x, y]));
                 }
             }
         }
+        sources
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a comparison means, in words.
 
 use super::{
-    Group, LEVEL, SidesTest, Units,
+    Group, LEVEL, SideClass, SidesTest, Units,
     quantile::{NORMAL_800, NORMAL_975, NORMAL_9995},
 };
 use serde::{Deserialize, Serialize};
@@ -194,10 +194,28 @@ fn different(
         _ => " Four times as many cells would halve the interval.".to_owned(),
     };
     format!(
-        "Comb and foam {sure} differ in their numbers of sides ({}): {}.{more}",
+        "Comb and foam {sure} differ in their numbers of sides ({}): {}.{}{more}",
         chance(sides, groups, units),
-        shares(groups, found)
+        shares(groups, found),
+        largest(sides)
     )
+}
+
+/// The class with the largest difference, where that is not the hexagons.
+fn largest(sides: &SidesTest) -> String {
+    let by_difference =
+        |a: &&SideClass, b: &&SideClass| a.difference.value.abs().total_cmp(&b.difference.value.abs());
+    match sides.classes.iter().max_by(by_difference) {
+        Some(class) if class.sides != 6 => format!(
+            " They differ most in cells of {} sides: {:.1} % against {:.1} %, {} points{}.",
+            class.sides,
+            100.0 * class.share[0].value,
+            100.0 * class.share[1].value,
+            points(class.difference.value),
+            between(class.difference.interval)
+        ),
+        _ => String::new(),
+    }
 }
 
 fn no_difference(

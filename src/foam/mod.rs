@@ -16,6 +16,8 @@
 //! | the descent of any film complex; the whole run with its T1s, and its state as data | `relax/` |
 //! | pressures against sides and curvature, cell by cell | `audit.rs` |
 //! | who touches whom, for the comparison with combs | `pattern.rs` |
+//! | one bubble, held or free, and the landscape of its energy | `bubble/` |
+//! | foams of two layers, as in natural comb | `layers/` |
 //!
 //! Not promised: a relaxed foam is a local minimum; other seeds may lie lower. Energies are those of the mesh: their error
 //! falls with the fourth power of the number of elements along a film and is 1e-5 with the default on a foam of 64 cells.
@@ -27,8 +29,10 @@
 //! J. Nocedal and S. Wright, "Numerical Optimization" (2006), for Newton steps under constraints and inertia.
 
 pub mod audit;
+pub mod bubble;
 pub mod complex;
 pub mod energy;
+pub mod layers;
 pub mod network;
 pub mod relax;
 pub mod solve;

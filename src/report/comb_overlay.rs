@@ -10,14 +10,17 @@ use super::{
 };
 use crate::{
     comb::{Comb, Photo},
-    tessellation::{Cell, CellId, CellStatus, defects},
+    tessellation::{Cell, CellId, CellStatus, Defects, defects},
 };
 use glam::DVec2;
-use image::{ExtendedColorType, ImageEncoder, RgbImage, codecs::png, imageops};
+use image::{ExtendedColorType, ImageEncoder, RgbImage, codecs::png};
+use rayon::prelude::*;
 use resvg::tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, PixmapMut, Stroke, Transform};
 
 /// Pixels per cell in the overlay: a larger photograph is reduced to it, so that the file stays small enough to be opened.
-const OVERLAY_PITCH: f64 = 64.0;
+const OVERLAY_PITCH: f64 = 48.0;
+/// Rows that are drawn as one task.
+const BAND: usize = 256;
 /// Height of the legend.
 const LEGEND: f64 = 34.0;
 
@@ -27,20 +30,19 @@ const LEGEND: f64 = 34.0;
 /// The legend cannot be drawn or the file not be encoded.
 pub(super) fn draw(comb: &Comb, photo: &Photo) -> Result<Vec<u8>, FigureError> {
     let scale = (OVERLAY_PITCH / comb.pitch).min(1.0);
-    let full = photo.to_rgb8();
-    let picture = if scale < 1.0 {
-        let size = |length: usize| to_u32(length as f64 * scale).max(1);
-        imageops::thumbnail(&full, size(comb.width), size(comb.height))
-    } else {
-        full
-    };
-    let legend = legend(f64::from(picture.width()))?;
-    let (width, height) = picture.dimensions();
-    let mut sheet = with_alpha(&picture);
-    if let Some(pixmap) = PixmapMut::from_bytes(&mut sheet, width, height) {
-        Overlay { comb, scale, pixmap }.draw();
-    }
-    let mut bytes = without_alpha(&sheet);
+    let [width, height] = [comb.width, comb.height].map(|length| to_u32(length as f64 * scale).max(1));
+    let mut bytes = photo.scaled(width, height).into_raw();
+    let defects = defects(&comb.pattern);
+    let rows = BAND * 3 * width as usize;
+    bytes.par_chunks_mut(rows.max(1)).enumerate().for_each(|(band, rows)| {
+        let mut sheet = with_alpha(rows);
+        let height = to_u32((rows.len() / (3 * width as usize)) as f64);
+        if let Some(pixmap) = PixmapMut::from_bytes(&mut sheet, width, height) {
+            Overlay { comb, scale, pixmap, top: (band * BAND) as f64 }.draw(&defects);
+        }
+        without_alpha(&sheet, rows);
+    });
+    let legend = legend(f64::from(width))?;
     bytes.extend_from_slice(legend.as_raw());
     let mut file = Vec::new();
     let encoder =
@@ -49,24 +51,31 @@ pub(super) fn draw(comb: &Comb, photo: &Photo) -> Result<Vec<u8>, FigureError> {
     Ok(file)
 }
 
+/// A band of the overlay.
 struct Overlay<'a> {
     comb: &'a Comb,
     scale: f64,
     pixmap: PixmapMut<'a>,
+    /// First row of the band in the overlay.
+    top: f64,
 }
 
 impl Overlay<'_> {
-    fn draw(mut self) {
+    fn draw(mut self, defects: &Defects) {
         let comb = self.comb;
-        for (id, cell) in comb.pattern.cells.enumerated() {
-            if comb.details[id].seen {
-                self.cell(id, cell);
+        let near: Vec<(CellId, &Cell)> =
+            comb.pattern.cells.enumerated().filter(|(_, cell)| self.meets(cell.position.y)).collect();
+        for (id, cell) in &near {
+            if comb.details[*id].seen {
+                self.cell(*id, cell);
             } else {
                 self.dot(cell);
             }
         }
-        self.pairs();
-        for (_, cell) in comb.pattern.cells.enumerated() {
+        for pair in &defects.pairs {
+            self.pair([pair.few, pair.many].map(|id| comb.pattern.cells[id].position.truncate()));
+        }
+        for (_, cell) in near {
             if cell.status != CellStatus::Cut
                 && let Some(sides) = cell.sides.filter(|n| *n != 6)
             {
@@ -75,10 +84,15 @@ impl Overlay<'_> {
         }
     }
 
-    fn pairs(&mut self) {
-        let comb = self.comb;
-        for pair in defects(&comb.pattern).pairs {
-            let ends = [pair.few, pair.many].map(|id| comb.pattern.cells[id].position.truncate());
+    /// Whether a cell at this height of the photograph may be drawn in the band.
+    fn meets(&self, y: f64) -> bool {
+        let reach = 2.0 * self.comb.pitch * self.scale;
+        let from = y * self.scale - self.top;
+        from > -reach && from < f64::from(self.pixmap.height()) + reach
+    }
+
+    fn pair(&mut self, ends: [DVec2; 2]) {
+        if ends.iter().any(|end| self.meets(end.y)) {
             let path = self.path(&ends, false);
             self.stroke(path.as_ref(), Colour([255; 3]), 0.11, 1.0);
             self.stroke(path.as_ref(), VERMILION, 0.06, 1.0);
@@ -134,7 +148,7 @@ impl Overlay<'_> {
     fn path(&self, points: &[DVec2], closed: bool) -> Option<Path> {
         let mut builder = PathBuilder::new();
         for (index, point) in points.iter().enumerate() {
-            let (x, y) = (single(point.x * self.scale), single(point.y * self.scale));
+            let (x, y) = (single(point.x * self.scale), single(point.y * self.scale - self.top));
             if index == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
         }
         if closed {
@@ -237,12 +251,14 @@ fn paint(colour: Colour, opacity: f64) -> Paint<'static> {
     paint
 }
 
-fn with_alpha(picture: &RgbImage) -> Vec<u8> {
-    picture.as_raw().chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], u8::MAX]).collect()
+fn with_alpha(rows: &[u8]) -> Vec<u8> {
+    rows.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], u8::MAX]).collect()
 }
 
-fn without_alpha(sheet: &[u8]) -> Vec<u8> {
-    sheet.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+fn without_alpha(sheet: &[u8], rows: &mut [u8]) {
+    for (pixel, drawn) in rows.chunks_exact_mut(3).zip(sheet.chunks_exact(4)) {
+        pixel.copy_from_slice(&drawn[..3]);
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "drawing coordinates need no more than single precision")]

@@ -103,8 +103,9 @@ fn legend(chart: &mut Chart<'_>, corner: SeriesLabelPosition) -> Result<(), Char
 fn error_bar(chart: &mut Chart<'_>, x: f64, estimate: &Estimate) -> Result<(), ChartError> {
     if let Some([low, high]) = estimate.interval {
         let style = rgb(INK).stroke_width(2);
-        let bar = ErrorBar::new_vertical(x, low, estimate.value.clamp(low, high), high, style, 8);
-        chart.draw_series(std::iter::once(bar)).map_err(failed)?;
+        let cap = |y: f64| PathElement::new(vec![(x - 0.04, y), (x + 0.04, y)], style);
+        let bar = PathElement::new(vec![(x, low), (x, high)], style);
+        chart.draw_series([bar, cap(low), cap(high)]).map_err(failed)?;
     }
     Ok(())
 }
@@ -343,28 +344,43 @@ pub fn chains(comparison: &Comparison) -> Result<Figure, ChartError> {
 pub fn curvature(comparison: &Comparison) -> Result<Option<Figure>, ChartError> {
     let of = |group: &Group| -> Vec<(f64, f64)> {
         let regions = group.patterns.iter().filter_map(|p| p.statistics.curvature.as_ref());
-        let shown = regions.filter_map(|all| all.iter().rfind(|r| r.radius <= SHOWN_RADIUS));
-        shown.flat_map(|r| r.regions.iter().map(|[k, q]| (*k, *q))).collect()
+        regions.flatten().flat_map(|r| r.regions.iter().map(|[k, q]| (*k, *q))).collect()
     };
-    let mut series = Points { points: groups(comparison).map(of), fits: [None, None] };
+    let series = Points { points: groups(comparison).map(of), fits: [None, None] };
     if series.points.iter().all(Vec::is_empty) {
         return Ok(None);
     }
     let (x, y) = ranges(&series, (1.0, 2.0));
-    series.fits[1] = Some(vec![(x.start, x.start), (x.end, x.end)]);
+    let diagonal = [(x.start, x.start), (x.end, x.end)];
     let axes = Axes {
-        title: "Charge against curvature, regions within two walls",
+        title: "Charge against curvature, regions of growing size",
         x: ("∫K dA", x),
         y: ("Σ(6 − n) · π/3", y),
         digits: (1, 1),
         labels: 8,
     };
-    let figure = points(&axes, &series, labels(comparison, |_| String::new()))?;
+    let labels = labels(comparison, |_| String::new());
+    let figure = chart(&axes, |chart| {
+        for (at, label) in labels.into_iter().enumerate().rev() {
+            let colour = rgb(COLOURS[at]);
+            // Thousands of regions: a crowd shows as a darker place.
+            let dots =
+                series.points[at].iter().map(|place| Circle::new(*place, 3, colour.mix(0.25).filled()));
+            chart
+                .draw_series(dots)
+                .map_err(failed)?
+                .label(label)
+                .legend(move |(x, y)| Circle::new((x + 10, y), 5, colour.filled()));
+        }
+        chart
+            .draw_series(LineSeries::new(diagonal, rgb(INK).stroke_width(1)))
+            .map_err(failed)?
+            .label("charge = curvature")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 20, y)], rgb(INK).stroke_width(1)));
+        legend(chart, SeriesLabelPosition::UpperLeft)
+    })?;
     Ok(Some(figure))
 }
-
-/// The regions that are drawn reach this many walls from their middle.
-const SHOWN_RADIUS: usize = 2;
 
 /// Power against the number of cells, on a logarithmic scale: the share of pairs that were found different.
 ///

@@ -87,7 +87,7 @@ fn per_polygon<'a, T: Copy + 'a>(
     pieces.iter().flat_map(move |piece| std::iter::repeat_n(figure(piece), piece.polygons.len()))
 }
 
-fn array<T: Display>(
+pub(super) fn array<T: Display>(
     writer: &mut impl Write,
     kind: &str,
     name: &str,

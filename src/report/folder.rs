@@ -37,6 +37,7 @@ pub struct OutputFolder {
     target: PathBuf,
     staging: tempfile::TempDir,
     names: Vec<String>,
+    prefix: String,
 }
 
 impl OutputFolder {
@@ -61,7 +62,12 @@ impl OutputFolder {
             .prefix(".combwright-")
             .tempdir_in(home)
             .map_err(|e| OutputError::new("write to the folder", home, e))?;
-        Ok(Self { target, staging, names: Vec::new() })
+        Ok(Self { target, staging, names: Vec::new(), prefix: String::new() })
+    }
+
+    /// What is written from now on lies in this sub-folder; an empty name means the folder itself.
+    pub fn enter(&mut self, sub_folder: &str) {
+        self.prefix = if sub_folder.is_empty() { String::new() } else { format!("{sub_folder}/") };
     }
 
     /// Writes one file through a buffered writer; `name` may hold sub-folders.
@@ -73,7 +79,7 @@ impl OutputFolder {
         name: impl Into<String>,
         content: impl FnOnce(&mut io::BufWriter<fs::File>) -> io::Result<()>,
     ) -> Result<(), OutputError> {
-        let name = name.into();
+        let name = format!("{}{}", self.prefix, name.into());
         let path = self.staging.path().join(&name);
         if let Some(parent) = path.parent() {
             fs::create_dir_all(parent).map_err(|e| OutputError::new("make the folder", parent, e))?;

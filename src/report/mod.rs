@@ -11,10 +11,16 @@
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
 //! | a relaxed foam as polygons, and for ParaView and viewers | `foam_surface.rs`, `foam_export.rs` |
 //! | the foam's picture, charts and tables; a partition's cells | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
+//! | where a bubble wants to be: table, charts, coloured surface | `bubble.rs` |
+//! | two layers of cells: picture, table | `layers.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
+//! | comb on its wall, for ParaView | `comb_on_wall.rs` |
+//! | the page: text, scenes, photographs | `page.rs`, `page_scene.rs`, `page_photo.rs`, `page/`, `vendor/` |
 //! | a comparison's charts, tables and files | `compare_charts.rs`, `compare_map.rs`, `compare_files.rs` |
 
+pub mod bubble;
 pub mod comb;
+mod comb_on_wall;
 mod comb_overlay;
 pub mod compare_charts;
 pub mod compare_files;
@@ -29,5 +35,13 @@ pub mod foam_files;
 pub mod foam_picture;
 pub mod foam_surface;
 pub mod folder;
+pub mod layers;
+pub mod page;
+mod page_photo;
+mod page_scene;
 pub mod palette;
 pub mod render;
+
+pub use comb_on_wall::write_comb_vtp;
+pub use page_photo::page_photo;
+pub use page_scene::{Layer, LayerCells, Scene};

@@ -33,7 +33,7 @@ mod lloyd;
 mod measure;
 mod mesh;
 mod network;
-mod polyhedron;
+pub(in crate::foam) mod polyhedron;
 
 pub use defect::PartitionDefect;
 pub use mesh::CellMesh;

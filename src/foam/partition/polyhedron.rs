@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// What lies behind a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Behind {
+pub(in crate::foam) enum Behind {
     /// Nothing yet: a face of the cube that the polyhedron was cut from.
     Cube,
     /// A plane wall of the domain.
@@ -23,10 +23,10 @@ pub(super) enum Behind {
 
 /// The half space `normal · x ≤ offset` with a unit normal, pointing out.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct HalfSpace {
-    pub(super) normal: DVec3,
-    pub(super) offset: f64,
-    pub(super) behind: Behind,
+pub(in crate::foam) struct HalfSpace {
+    pub(in crate::foam) normal: DVec3,
+    pub(in crate::foam) offset: f64,
+    pub(in crate::foam) behind: Behind,
 }
 
 impl HalfSpace {
@@ -37,25 +37,25 @@ impl HalfSpace {
 
 /// A face: its plane, and its corners counter-clockwise seen from outside.
 #[derive(Clone, Debug)]
-pub(super) struct Face {
-    pub(super) half_space: HalfSpace,
-    pub(super) corners: Vec<u32>,
+pub(in crate::foam) struct Face {
+    pub(in crate::foam) half_space: HalfSpace,
+    pub(in crate::foam) corners: Vec<u32>,
 }
 
 /// A convex polyhedron, closed and bounded.
 #[derive(Clone, Debug)]
-pub(super) struct Polyhedron {
-    pub(super) corners: Vec<DVec3>,
-    pub(super) faces: Vec<Face>,
+pub(in crate::foam) struct Polyhedron {
+    pub(in crate::foam) corners: Vec<DVec3>,
+    pub(in crate::foam) faces: Vec<Face>,
 }
 
 /// A cut ran so close through corners that what it leaves is no polyhedron, or leaves nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct DegenerateCut;
+pub(in crate::foam) struct DegenerateCut;
 
 impl Polyhedron {
     /// The cube `[-half, half]³`.
-    pub(super) fn cube(half: f64) -> Self {
+    pub(in crate::foam) fn cube(half: f64) -> Self {
         let corners = (0..8)
             .map(|code: u8| {
                 let side = |bit: u8| if code & bit > 0 { half } else { -half };
@@ -78,7 +78,7 @@ impl Polyhedron {
     }
 
     /// The square of the distance of the farthest corner from the origin.
-    pub(super) fn radius_squared(&self) -> f64 {
+    pub(in crate::foam) fn radius_squared(&self) -> f64 {
         self.corners.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max)
     }
 
@@ -86,7 +86,7 @@ impl Polyhedron {
     ///
     /// # Errors
     /// [`DegenerateCut`]; the polyhedron is then unchanged.
-    pub(super) fn cut(&mut self, half_space: HalfSpace) -> Result<bool, DegenerateCut> {
+    pub(in crate::foam) fn cut(&mut self, half_space: HalfSpace) -> Result<bool, DegenerateCut> {
         let heights: Vec<f64> = self.corners.iter().map(|&corner| half_space.height(corner)).collect();
         if heights.iter().all(|&height| height <= 0.0) {
             return Ok(false);

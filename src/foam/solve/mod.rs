@@ -15,6 +15,7 @@ mod mode;
 mod motion;
 mod rigid;
 mod sparse;
+pub(crate) mod symmetric;
 
 pub use mode::Mode;
 pub use sparse::FactorError;

@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""Runs Surface Evolver and combwright on the same datafiles with the same commands and prints their numbers side by side.
+
+    python3 analysis/evolver_table.py [--evolver PROGRAM] [--combwright PROGRAM] [--paper FOLDER] [--markdown]
+
+The datafiles are those of the Debian package evolver-doc (found by dpkg) and the paper's, in the folder given. Both programs
+print the energy and the volumes themselves, so the table holds what they say and nothing else. CPU seconds are user seconds.
+"""
+
+import argparse
+import re
+import resource
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+REPORT = (
+    'printf "RESULT %.15g\\n", total_energy; '
+    'foreach body bb do { printf "BODY %d %.15g %.15g\\n", bb.id, bb.volume, bb.pressure }; '
+)
+
+# What is run on each file. Both programs get exactly these commands.
+LEVELS = "r; u; V; V; V; g 30; hessian_seek; hessian_seek; hessian; hessian; hessian"
+CASES = [
+    ("cube.fe", "gogo"),
+    ("mound.fe", "gogo"),
+    ("column.fe", "u; g 5; r; g 5; r; g 5; hessian; hessian"),
+    ("cat.fe", "rmax := 1; zmax := 0.55; recalc; u; r; g 20; hessian; hessian; hessian"),
+    ("catbody.fe", "gogo"),
+    ("twointor.fe", "gogo"),
+    ("phelanc.fe", "g 5; r; g 5; hessian; hessian; hessian"),
+    ("quad.fe", "gogo"),
+    ("tankex.fe", "g 5; r; g 5; r; g 10"),
+    ("sphere.fe", "g 5; r; g 5; r; g 5"),
+    ("qmound.fe", "gogo"),
+    ("catman.fe", "r; u; g 20; hessian; hessian"),
+    ("octa.fe", "g 5"),
+    ("slidestr.fe", "r; g 50"),
+    ("popstr.fe", "g 5"),
+    ("100grain.fe", "g 5"),
+    ("addload_example.fe", "g 5"),
+    ("crystal.fe", "g 5"),
+    ("knotty.fe", "g 5"),
+    ("metric.fe", "g 5"),
+    ("mylarcube.fe", "g 5"),
+    ("quadm.fe", "g 5"),
+    ("relaxed.fe", "g 5"),
+    ("simplex3.fe", "g 5"),
+    ("symtest.fe", "g 5"),
+]
+PAPER = [
+    ("Sphere.fe", LEVELS),
+    ("Sphere.fe", "; ".join([LEVELS] * 3)),
+    ("Torus.fe", LEVELS),
+    ("TorusOuter.fe", "; ".join([LEVELS] * 2)),
+    ("TorusTop.fe", "; ".join([LEVELS] * 2)),
+    ("TorusInner.fe", "; ".join([LEVELS] * 2)),
+    ("Psurface.fe", "gogo"),
+    ("PsurfaceOriented.fe", "body[1].target := 0.002; re1; re2; g 20; r; g 50"),
+    ("foams/plates_64.fe", "g 30; hessian_seek; hessian_seek; hessian_seek"),
+    ("foams/plates_256.fe", "g 30; hessian_seek; hessian_seek; hessian_seek"),
+    ("foams/flat2d_64.fe", "g 20; hessian_seek; hessian; hessian"),
+]
+
+
+def examples():
+    """The folder of evolver-doc's datafiles."""
+    listed = subprocess.run(["dpkg", "-L", "evolver-doc"], capture_output=True, text=True, check=False).stdout
+    for line in listed.splitlines():
+        if line.endswith("/examples/cube.fe"):
+            return Path(line).parent
+    return None
+
+
+def timed(command, **options):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, **options)
+        text = done.stdout + done.stderr
+    except subprocess.TimeoutExpired:
+        text = "error: no end after 300 s"
+    return text, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def figures(text):
+    """The last energy and the bodies' volumes and pressures; or what went wrong."""
+    energies = re.findall(r"RESULT (\S+)", text)
+    if not energies:
+        found = re.search(r"(?:error: )?(not supported: [^\n]*)|error: ([^\n]*)", text)
+        reason = (found.group(1) or found.group(2)) if found else "no result"
+        return None, [], reason
+    bodies = re.findall(r"BODY (\d+) (\S+) (\S+)", text)
+    return float(energies[-1]), bodies, ""
+
+
+def run_evolver(program, file, commands):
+    script = "quiet on\n" + "\n".join(part for part in (commands, REPORT)) + "\nq\nq\n"
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / file.name
+        shutil.copy(file, copy)
+        return timed([program, copy.name], input=script, cwd=folder)
+
+
+def run_combwright(program, file, commands, as_printed):
+    options = ["--as-printed"] if as_printed else []
+    with tempfile.TemporaryDirectory() as folder:
+        return timed([program, "evolver", "run", str(file), "-c", "quiet on", "-c", commands, "-c", REPORT, "-o", folder, *options])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--evolver", default="evolver-nox-d")
+    parser.add_argument("--combwright", default="target/debug/combwright")
+    parser.add_argument("--paper", type=Path, default=Path("../shared/fe"))
+    parser.add_argument("--only", help="only files whose name holds this")
+    parser.add_argument("--markdown", action="store_true", help="a table for the documentation")
+    arguments = parser.parse_args()
+    folder = examples()
+    cases = [(folder / name, commands) for name, commands in CASES] if folder else []
+    cases += [(arguments.paper / name, commands) for name, commands in PAPER]
+    row = "| {} | {} | {} | {} | {} | {} |" if arguments.markdown else "{:22} {:>21} {:>21} {:>9} {:>7} {:>7}"
+    print(row.format("datafile", "Surface Evolver", "combwright", "relative", "s", "s"))
+    if arguments.markdown:
+        print("|---|---|---|---|---|---|")
+    for file, commands in cases:
+        if not file.exists() or (arguments.only and arguments.only not in file.name):
+            continue
+        theirs, _, why_theirs = (lambda t: figures(t[0]) if t else None)(result := run_evolver(arguments.evolver, file, commands))
+        ours, _, why_ours = figures((answer := run_combwright(arguments.combwright, file, commands, file.name == "Psurface.fe"))[0])
+        difference = f"{abs(ours / theirs - 1):.1e}" if ours is not None and theirs else "-"
+        shown = [f"{value:.12g}" if value is not None else why for value, why in ((theirs, why_theirs), (ours, why_ours))]
+        print(row.format(file.name, *shown, difference, f"{result[1]:.2f}", f"{answer[1]:.2f}"), flush=True)
+
+
+if __name__ == "__main__":
+    main()

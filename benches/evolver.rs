@@ -1,0 +1,206 @@
+//! Time of `g` and of `hessian` on a bubble of thousands of facets, per facet; with `fuzz SECONDS`, random texts through the
+//! reader and the interpreter for that long.
+//!
+//!     cargo bench --bench evolver
+//!     cargo bench --bench evolver -- fuzz 600
+//!
+//! The same commands in Surface Evolver: `g 10` after five and six `r` of cube.fe; quote its user seconds.
+
+use combwright::evolver::{
+    Document, parse_commands,
+    session::{Host, Session},
+    source::Source,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::time::{Duration, Instant};
+
+const CUBE: &str = "vertices
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+5 0 0 1
+6 1 0 1
+7 1 1 1
+8 0 1 1
+edges
+1 1 2
+2 2 3
+3 3 4
+4 4 1
+5 5 6
+6 6 7
+7 7 8
+8 8 5
+9 1 5
+10 2 6
+11 3 7
+12 4 8
+faces
+1 1 10 -5 -9
+2 2 11 -6 -10
+3 3 12 -7 -11
+4 4 9 -8 -12
+5 5 6 7 8
+6 -4 -3 -2 -1
+bodies
+1 1 2 3 4 5 6 volume 1
+";
+
+struct Silent;
+
+impl Host for Silent {
+    fn print(&mut self, _text: &str) {}
+
+    fn write(&mut self, _name: &str, _text: &str, _append: bool) -> Result<(), std::io::Error> {
+        Ok(())
+    }
+
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+fn session() -> Session {
+    Session::new(Document::new(&Source::new("cube", CUBE)).expect("a sound file")).expect("a sound surface")
+}
+
+fn timed(session: &mut Session, commands: &str) -> f64 {
+    let source = Source::new("bench", commands);
+    let statements = parse_commands(&source).expect("sound commands");
+    let began = Instant::now();
+    session.run(&source, &statements, &mut Silent).expect("sound steps");
+    began.elapsed().as_secs_f64()
+}
+
+fn speed() {
+    for levels in [4, 5, 6] {
+        let mut session = session();
+        timed(&mut session, &"g 5; r; ".repeat(levels));
+        let facets = session.surface().facets.len();
+        timed(&mut session, "g 2");
+        let g = timed(&mut session, "g 10") / 10.0;
+        let hessian = timed(&mut session, "hessian");
+        let per_facet = 1e6 / f64::from(u32::try_from(facets).unwrap_or(u32::MAX));
+        println!("{facets} facets: g {:.4} s ({:.3} µs per facet), hessian {hessian:.3} s", g, g * per_facet);
+    }
+}
+
+const WORDS: [&str; 60] = [
+    "vertices",
+    "edges",
+    "faces",
+    "bodies",
+    "read",
+    "constraint",
+    "formula:",
+    "content:",
+    "c1:",
+    "e1:",
+    "parameter",
+    "x",
+    "y",
+    "^",
+    "1",
+    "-3",
+    "2.5e3",
+    "1e999",
+    "(",
+    ")",
+    "{",
+    "}",
+    "[",
+    "]",
+    ":=",
+    "+=",
+    ";",
+    ",",
+    ":",
+    "?",
+    "*",
+    "/",
+    "where",
+    "foreach",
+    "do",
+    "if",
+    "then",
+    "else",
+    "while",
+    "for",
+    "sum(",
+    "max(",
+    "edge",
+    "vertex",
+    "facet",
+    "body",
+    ".",
+    "\"%d %g %s\\n\"",
+    "printf",
+    "g 1",
+    "r",
+    "u",
+    "V",
+    "hessian",
+    "set",
+    "#define A B",
+    "A",
+    "\n",
+    "volume",
+    "torus",
+];
+
+/// Random bytes, random words, and mutations of a sound file; a session runs what can be read.
+fn fuzz(seconds: u64) {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let end = Instant::now() + Duration::from_secs(seconds);
+    let mut count = 0_u64;
+    let mut slowest = Duration::ZERO;
+    while Instant::now() < end {
+        let text = match count % 3 {
+            0 => {
+                let bytes: Vec<u8> =
+                    (0..random.random_range(0..300)).map(|_| random.random_range(0..=255)).collect();
+                String::from_utf8_lossy(&bytes).into_owned()
+            }
+            1 => (0..random.random_range(0..80))
+                .map(|_| WORDS[random.random_range(0..WORDS.len())])
+                .collect::<Vec<_>>()
+                .join(" "),
+            _ => {
+                let mut bytes =
+                    format!("{CUBE}read\nr; g 2; u; V; printf \"%g\", total_energy; hessian\n").into_bytes();
+                for _ in 0..random.random_range(1..8) {
+                    let at = random.random_range(0..bytes.len());
+                    bytes[at] = b" 0123456789-+.*/()[]{};:=\nabcdefgvx"[random.random_range(0..36)];
+                }
+                String::from_utf8_lossy(&bytes).into_owned()
+            }
+        };
+        count += 1;
+        let began = Instant::now();
+        let source = Source::new("fuzz", text);
+        if let Ok(mut document) = Document::new(&source) {
+            let commands = std::mem::take(&mut document.commands);
+            if let Ok(mut session) = Session::new(document) {
+                session.set_budget(200);
+                let _ = session.run(&source, &commands, &mut Silent);
+            }
+        }
+        if let Ok(statements) = parse_commands(&source) {
+            let mut session = session();
+            session.set_budget(50);
+            let _ = session.run(&source, &statements, &mut Silent);
+        }
+        slowest = slowest.max(began.elapsed());
+    }
+    println!("{count} texts in {seconds} s, the slowest took {:.3} s", slowest.as_secs_f64());
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    match arguments.iter().position(|word| word == "fuzz") {
+        Some(at) => fuzz(arguments.get(at + 1).and_then(|seconds| seconds.parse().ok()).unwrap_or(60)),
+        None => speed(),
+    }
+}

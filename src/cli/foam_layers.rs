@@ -1,0 +1,211 @@
+//! `combwright foam --layers 2`: a sheet of cells on each wall.
+
+use super::{
+    CliError,
+    foam_run::{Line, by_sides, finished},
+    foam_settings::FoamSettings,
+    interrupt, progress,
+};
+use crate::{
+    foam::{
+        layers::{
+            Arrangement, Companions, Division, LayerFigures, Layers, NoLayers, corner_angles, layer_figures,
+            plane_end, relaxed, sheets, tetrahedral_angle,
+        },
+        relax::Ending,
+        seeds::SeedError,
+        setup::FoamSpace,
+    },
+    report::{folder::OutputFolder, layers as report},
+};
+use anyhow::anyhow;
+use serde::Serialize;
+use std::time::Instant;
+
+/// How the cells of two layers are arranged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum PatternName {
+    /// As bees build between plane walls: three rhombi at an end
+    Rhombic,
+    /// As Fejes Tóth found: two hexagons and two rhombi at an end
+    Toth,
+    /// Annealed on both sides, each for itself
+    Annealed,
+}
+
+impl From<PatternName> for Arrangement {
+    fn from(name: PatternName) -> Self {
+        match name {
+            PatternName::Rhombic => Self::Rhombic,
+            PatternName::Toth => Self::Toth,
+            PatternName::Annealed => Self::Annealed,
+        }
+    }
+}
+
+/// The name and version of `summary.json`.
+const SCHEMA: &str = "combwright.layers-summary/1";
+
+/// Steps of the progress bar.
+const BAR: u64 = 1000;
+
+/// The figures of a two-layer foam.
+#[derive(Serialize)]
+struct Summary<'a> {
+    schema: &'static str,
+    version: &'static str,
+    space: FoamSpace,
+    pattern: Arrangement,
+    cells_on_each_wall: usize,
+    seed: u64,
+    first_energy: f64,
+    energy: f64,
+    /// The least energy of ends with plane films, by formula, over one cell's opening.
+    plane_end: Option<f64>,
+    ended: String,
+    steps: usize,
+    force: f64,
+    unstable: usize,
+    vanishing_borders: usize,
+    volume_spread: f64,
+    corner_angle_mean_deg: f64,
+    corner_angle_worst_deg: f64,
+    layers: &'a [LayerFigures; 2],
+    seconds: f64,
+}
+
+/// Makes a foam of two layers and writes its folder.
+pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> Result<(), CliError> {
+    let began = Instant::now();
+    let mut folder = OutputFolder::begin(&settings.output)?;
+    let gap = settings.space.gap().map_err(CliError::mistake)?;
+    let domain = settings.space.domain().map_err(CliError::mistake)?;
+    let (arrangement, cells) = (Arrangement::from(pattern), settings.seeds.count);
+    interrupt::listen();
+    let bar = progress::steps(BAR);
+    bar.set_message("seeds of both layers");
+    let sheets =
+        sheets(&settings.space, &gap, arrangement, cells, settings.seeds.seed, &mut |_| interrupt::flow());
+    let sheets = sheets.map_err(failed)?;
+    let division =
+        Division::new(&gap, &domain, &sheets.seeds, sheets.lower, sheets.spacing).map_err(failed)?;
+    // The same number of elements on each half side; the default is the coarsest.
+    let fineness = if fine { settings.relax.strips.along } else { 1 };
+    let tolerance = settings.relax.tolerance.max(1e-10);
+    let layers = relaxed(division, &gap, fineness, sheets.spacing, tolerance, &mut |told| {
+        bar.set_message(format!("force {:.1e}", told.residuals.force));
+        interrupt::flow()
+    });
+    let layers = layers.map_err(failed)?;
+    bar.finish_and_clear();
+    let figures = layer_figures(&layers.division, sheets.spacing);
+    let title = format!("{}, {cells} cells on each wall, {}", settings.space, arrangement.name());
+    report::write_cells(&mut folder, &layers, &figures)?;
+    report::picture(&layers, &figures, &gap, &title)?.write_png(&mut folder, "layers", 1.0)?;
+    let angles = angles(&layers);
+    let summary = Summary {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        space: settings.space,
+        pattern: arrangement,
+        cells_on_each_wall: cells,
+        seed: settings.seeds.seed,
+        first_energy: layers.first_energy,
+        energy: layers.energy,
+        plane_end: plane_end(arrangement).map(|end| end.area),
+        ended: ended(&layers),
+        steps: layers.descended.steps,
+        force: layers.descended.residuals.force,
+        unstable: layers.descended.unstable,
+        vanishing_borders: layers.vanishing.len(),
+        volume_spread: layers.volume_spread(),
+        corner_angle_mean_deg: angles[0],
+        corner_angle_worst_deg: angles[1],
+        layers: &figures,
+        seconds: began.elapsed().as_secs_f64(),
+    };
+    folder.write_json("summary.json", &summary)?;
+    let mut lines = table(&summary, &layers);
+    for (name, figures) in [("lower layer", &figures[0]), ("upper layer", &figures[1])] {
+        lines.push((name, in_words(figures)));
+    }
+    lines.extend(companions("defects, lower to upper", &figures[0].companions));
+    lines.extend(companions("defects, upper to lower", &figures[1].companions));
+    lines.push(("time", format!("{:.1} s", summary.seconds)));
+    finished(folder, lines)
+}
+
+fn failed(error: NoLayers) -> CliError {
+    match error {
+        NoLayers::Sown(SeedError::Interrupted { .. }) | NoLayers::Factor(_) | NoLayers::Lost { .. } => {
+            CliError::failure(anyhow!("{error}"))
+        }
+        _ => CliError::mistake(error),
+    }
+}
+
+/// Mean and largest distance of the corners' angles from the tetrahedral angle, in degrees.
+fn angles(layers: &Layers) -> [f64; 2] {
+    let angles = corner_angles(layers);
+    let off = |angle: &f64| (angle - tetrahedral_angle()).to_degrees();
+    let worst = angles.iter().map(|angle| off(angle).abs()).fold(0.0, f64::max);
+    let count = f64::from(crate::index::checked_u32(angles.len().max(1)));
+    [angles.iter().map(off).sum::<f64>() / count, worst]
+}
+
+fn ended(layers: &Layers) -> String {
+    let descended = &layers.descended;
+    let vanishing = layers.vanishing.len();
+    match descended.ending {
+        Ending::Converged => format!("converged in {} Newton steps", descended.steps),
+        Ending::StepLimit => {
+            format!("step limit of {} reached, {vanishing} borders vanishing", descended.steps)
+        }
+        Ending::Stalled => format!("stalled after {} steps, {vanishing} borders vanishing", descended.steps),
+        Ending::Halted => {
+            format!(
+                "stopped after {} steps: {vanishing} borders vanish, where the foam would change its topology",
+                descended.steps
+            )
+        }
+    }
+}
+
+fn table(summary: &Summary<'_>, layers: &Layers) -> Vec<Line> {
+    let mut lines = vec![
+        ("space", summary.space.to_string()),
+        ("cells on each wall", summary.cells_on_each_wall.to_string()),
+        ("arrangement", summary.pattern.name().to_owned()),
+        ("films", layers.films.complex.films.len().to_string()),
+        ("energy, plane films", format!("{:.9}", summary.first_energy)),
+        ("energy, curved films", format!("{:.9}", summary.energy)),
+    ];
+    if let Some(area) = summary.plane_end {
+        lines.push(("plane ends by formula", format!("{area:.6} of an opening, flat ends 1")));
+    }
+    lines.extend([
+        ("ended", summary.ended.clone()),
+        ("largest force", format!("{:.1e}", summary.force)),
+        ("falling directions", summary.unstable.to_string()),
+        ("spread of volumes", format!("{:.1e}", summary.volume_spread)),
+        (
+            "corners off 109.47°",
+            format!(
+                "{:.4}° in the mean, {:.2}° at most",
+                summary.corner_angle_mean_deg, summary.corner_angle_worst_deg
+            ),
+        ),
+    ]);
+    lines
+}
+
+fn in_words(figures: &LayerFigures) -> String {
+    format!("sides {}; end films {}", by_sides(&figures.side_counts), by_sides(&figures.end_counts))
+}
+
+fn companions(name: &'static str, companions: &Companions) -> Option<Line> {
+    (companions.defects > 0 && companions.nearest.is_finite()).then(|| {
+        let Companions { defects, nearest, nearest_by_chance, charge_correlation } = companions;
+        (name, format!("{defects}, nearest at {nearest:.2} spacings ({nearest_by_chance:.2} by chance), correlation of charges {charge_correlation:+.2}"))
+    })
+}

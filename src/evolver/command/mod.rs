@@ -1,0 +1,247 @@
+//! Commands as trees.
+//!
+//! | part | file |
+//! |---|---|
+//! | statements | this page |
+//! | words of the control language: loops, conditions, assignments | `parse.rs` |
+//! | words that act on the surface | `actions.rs` |
+
+mod actions;
+mod parse;
+
+use super::{
+    datafile::ExtraAttribute,
+    error::EvolverError,
+    language::{
+        Cursor,
+        expression::{ElementKind, Expression, Query},
+    },
+    source::Position,
+};
+use std::sync::Arc;
+
+pub(crate) use parse::statements;
+
+/// A statement with its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Statement {
+    /// Where it begins.
+    pub position: Position,
+    /// What it does.
+    pub action: Action,
+}
+
+/// How an assignment changes what it assigns to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Assignment {
+    /// `:=`
+    Set,
+    /// `+=`
+    Add,
+    /// `-=`
+    Subtract,
+    /// `*=`
+    Multiply,
+    /// `/=`
+    Divide,
+}
+
+/// Which elements a command acts on.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Target {
+    /// Those that a query finds.
+    Query(Query),
+    /// One element, by an expression.
+    Element(Expression),
+}
+
+/// A command with elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ElementCommand {
+    /// Divides edges.
+    Refine,
+    /// Deletes elements.
+    Delete,
+    /// Fixes elements.
+    Fix,
+    /// Frees them.
+    Unfix,
+    /// Lists them.
+    List,
+    /// Averages vertices.
+    Average,
+    /// Swaps edges where that makes triangles more equal.
+    Equiangulate,
+    /// Swaps edges.
+    Edgeswap,
+    /// Pops vertices or edges where more films meet than can.
+    Pop,
+    /// Exchanges neighbours across short edges of strings.
+    T1,
+}
+
+/// A command without elements.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Simple {
+    /// `r`
+    Refine,
+    /// `u`
+    Equiangulate,
+    /// `V`
+    Average,
+    /// `v`
+    Volumes,
+    /// `e`, `c`: counts of elements.
+    Counts,
+    /// `o`
+    PopEdges,
+    /// `O`
+    PopNonminimal,
+    /// `U`
+    ConjugateGradient(Option<bool>),
+    /// `hessian`
+    Hessian,
+    /// `C`: runs checks.
+    Check,
+    /// `linear`
+    Linear,
+    /// `quadratic`
+    Quadratic,
+    /// `recalc`
+    Recalculate,
+    /// `X`, `z`, `i`: information.
+    Information,
+    /// `q`, `quit`
+    Quit,
+    /// `break`
+    Break,
+    /// `continue`
+    Continue,
+    /// `return`
+    Return,
+    /// A command that shows or sets nothing that matters here.
+    Nothing,
+    /// `help`
+    Help,
+}
+
+/// A command with a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Numeric {
+    /// `g`
+    Iterate,
+    /// `t`
+    RemoveShortEdges,
+    /// `l`
+    DivideLongEdges,
+    /// `w`
+    RemoveSmallFacets,
+    /// `K`
+    DivideSkinnyFacets,
+    /// `m`
+    FixScale,
+    /// `G`
+    Gravity,
+    /// `M`
+    Model,
+    /// `hessian_seek`
+    HessianSeek,
+    /// `saddle`
+    Saddle,
+    /// `eigenprobe`
+    Eigenprobe,
+    /// `n`: notching.
+    Notch,
+}
+
+/// What a statement does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Action {
+    /// Several statements.
+    Block(Vec<Statement>),
+    /// A statement several times.
+    Repeat(Box<Statement>, Expression),
+    /// `if … then … else …`.
+    If(Expression, Box<Statement>, Option<Box<Statement>>),
+    /// `while … do …`.
+    While(Expression, Box<Statement>),
+    /// `do … while …`.
+    DoWhile(Box<Statement>, Expression),
+    /// `for ( a ; b ; c ) …`.
+    For(Box<[Statement; 2]>, Expression, Box<Statement>),
+    /// `foreach … do …`.
+    Foreach(Query, Box<Statement>),
+    /// `name := expression`.
+    Assign(Arc<str>, Assignment, Expression),
+    /// `name := "text"`.
+    AssignText(Arc<str>, Expression),
+    /// `name := { … }`.
+    Define(Arc<str>, Arc<Statement>),
+    /// `vv.x += expression`, `body[1].target := expression`.
+    AssignMember(Expression, Assignment, Expression),
+    /// `set vertex y expression where …`; the attribute may have an index; a bare attribute switches on.
+    Set(Query, Arc<str>, Option<Expression>, Option<Expression>),
+    /// `unset vertex fixed where …`.
+    Unset(Query, Arc<str>, Option<Expression>),
+    /// A command on elements.
+    Elements(ElementCommand, Target),
+    /// A command without elements.
+    Simple(Simple),
+    /// A command with a number.
+    Numeric(Numeric, Option<Expression>),
+    /// `ritz(value, count)`.
+    Ritz(Expression, Expression),
+    /// `print expression`.
+    Print(Expression),
+    /// `printf "…", a, b` and its kin.
+    Printf(Expression, Vec<Expression>),
+    /// `histogram(query, expression)`; on logarithmic bins or not.
+    Histogram(Query, Expression, bool),
+    /// `dump "file"`.
+    Dump(Option<Expression>),
+    /// A statement whose output goes to a file; appended or not.
+    Redirect(Box<Statement>, Expression, bool),
+    /// A procedure by its name.
+    Call(Arc<str>),
+    /// An expression whose value is printed.
+    Show(Expression),
+    /// A switch such as `gravity on`.
+    Toggle(Arc<str>, Option<bool>),
+    /// `define vertex attribute …`.
+    DefineAttribute(ExtraAttribute),
+    /// `list` of something other than elements: nothing here.
+    ListInformation(Arc<str>),
+    /// A command that is not supported: its name and the nearest way to do it. It is an error where it runs.
+    Refused(Arc<str>, &'static str),
+}
+
+/// The rest of `define facet attribute name real[3]` behind the kind.
+pub(crate) fn parse_extra_attribute(
+    cursor: &mut Cursor,
+    kind: ElementKind,
+) -> Result<ExtraAttribute, EvolverError> {
+    if !cursor.accept_word("attribute") {
+        return cursor.expected("«attribute» and its name");
+    }
+    let name: Arc<str> = cursor.expect_word()?.into();
+    let integer = if cursor.accept_word("integer") {
+        true
+    } else if cursor.accept_word("real") {
+        false
+    } else {
+        return cursor.expected("«real» or «integer»");
+    };
+    let mut length = 1;
+    while cursor.accept("[") {
+        let position = cursor.position();
+        length *= usize::try_from(cursor.integer()?).unwrap_or(0);
+        if length == 0 || length > 1000 {
+            return cursor.invalid(position, "an attribute holds between 1 and 1000 numbers");
+        }
+        cursor.expect("]")?;
+    }
+    if cursor.is_symbol("(") || cursor.word().as_deref() == Some("function") {
+        return cursor.unsupported(cursor.position(), "an attribute with a formula or a variable size", "");
+    }
+    Ok(ExtraAttribute { kind, name, length, integer })
+}

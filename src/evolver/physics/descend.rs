@@ -1,0 +1,396 @@
+//! Steps down the gradient with volumes held: Surface Evolver's `g` with its optimising scale, conjugate gradients included.
+//!
+//! The force is minus the energy's gradient, within the constraints, less the multiples of the functionals' gradients that
+//! keep them to first order. Each trial moves by the force, returns to the constraints and restores the functionals along
+//! their gradients; the scale is found by doubling or halving and a parabola through three trials.
+
+use super::{
+    freedom::State,
+    gradient::{Gradients, Slots},
+    problem::{FunctionalId, Problem, Values},
+};
+use crate::{
+    evolver::{error::EvolverError, surface::VertexId},
+    foam::solve::symmetric::SymmetricPattern,
+    index::{Id, IndexVec, checked_u32},
+};
+use glam::DVec3;
+
+/// The scale of `g`, and the memory of conjugate gradients.
+#[derive(Clone, Debug)]
+pub(crate) struct Descent {
+    /// The present step.
+    pub(crate) scale: f64,
+    /// The largest.
+    pub(crate) limit: f64,
+    /// Whether it is not to be optimised.
+    pub(crate) fixed: bool,
+    /// Whether directions are conjugate.
+    pub(crate) conjugate: bool,
+    memory: Option<Memory>,
+}
+
+#[derive(Clone, Debug)]
+struct Memory {
+    force: IndexVec<VertexId, DVec3>,
+    direction: IndexVec<VertexId, DVec3>,
+    norm: f64,
+}
+
+impl Default for Descent {
+    fn default() -> Self {
+        Self { scale: 0.1, limit: 1.0, fixed: false, conjugate: false, memory: None }
+    }
+}
+
+/// What a step came to.
+#[derive(Clone, Debug)]
+pub(crate) struct Descended {
+    pub(crate) values: Values,
+    pub(crate) scale: f64,
+    /// The multipliers of the functionals: pressures.
+    pub(crate) multipliers: IndexVec<FunctionalId, f64>,
+    /// Whether nothing lowered the energy.
+    pub(crate) stuck: bool,
+}
+
+/// The sum of the functionals' errors at which restoring stops: Surface Evolver's, absolute as there.
+const TARGET_TOLERANCE: f64 = 1e-4;
+/// Restoring steps before giving up.
+const RESTORATIONS: usize = 10;
+/// Halvings of the scale before giving up.
+const HALVINGS: usize = 20;
+
+/// Functionals' gradients within the constraints, and what solves for combinations of them.
+pub(crate) struct Restoring {
+    velocities: Slots,
+    held: Vec<FunctionalId>,
+    row: IndexVec<FunctionalId, Option<u32>>,
+    entries: Vec<(u32, u32)>,
+    values: Vec<f64>,
+}
+
+impl Restoring {
+    pub(crate) fn new(problem: &Problem, state: &State, slots: &Slots) -> Self {
+        let held = problem.held();
+        let mut row = IndexVec::from_elem(None, problem.functionals().len());
+        for (at, &id) in held.iter().enumerate() {
+            row[id] = Some(checked_u32(at));
+        }
+        let mut velocities = slots.clone();
+        let size = held.len();
+        let mut dense = if size <= DENSE { vec![0.0; size * size] } else { Vec::new() };
+        let mut sparse: std::collections::BTreeMap<(u32, u32), f64> = std::collections::BTreeMap::new();
+        for vertex in problem.holds.ids() {
+            let range = velocities.range(vertex.index());
+            if range.is_empty() {
+                continue;
+            }
+            for slot in range.clone() {
+                velocities.values[slot] = problem.projected(state, vertex, slots.values[slot]);
+            }
+            let own: Vec<(FunctionalId, DVec3)> = velocities.at(vertex).collect();
+            let raw: Vec<(FunctionalId, DVec3)> = slots.at(vertex).collect();
+            for (i, (a, gradient)) in raw.iter().enumerate() {
+                // On a boundary both must be velocities of parameters.
+                let gradient = if problem.moves_on_boundary(vertex) { own[i].1 } else { *gradient };
+                for (b, velocity) in &own {
+                    if let (Some(r), Some(c)) = (row[*a], row[*b])
+                        && r >= c
+                    {
+                        let value = gradient.dot(*velocity);
+                        if size <= DENSE {
+                            dense[r as usize * size + c as usize] += value;
+                        } else {
+                            *sparse.entry((r, c)).or_insert(0.0) += value;
+                        }
+                    }
+                }
+            }
+        }
+        for r in 0..dense.len().min(size * size) {
+            let (r, c) = (r / size, r % size);
+            if r >= c {
+                sparse.insert((checked_u32(r), checked_u32(c)), dense[r * size + c]);
+            }
+        }
+        // A volume that nothing can change, or that follows from others, must not make the matrix singular.
+        let most = sparse.iter().filter(|((r, c), _)| r == c).fold(0.0, |most: f64, (_, v)| most.max(*v));
+        for at in 0..size {
+            *sparse.entry((checked_u32(at), checked_u32(at))).or_insert(0.0) +=
+                STIFFENING * most.max(f64::MIN_POSITIVE);
+        }
+        let (entries, values) = sparse.into_iter().unzip();
+        Self { velocities, held, row, entries, values }
+    }
+
+    /// The combination whose motion changes the functionals by `wanted`.
+    fn combination(&self, wanted: &[f64]) -> Result<Vec<f64>, EvolverError> {
+        if wanted.is_empty() {
+            return Ok(Vec::new());
+        }
+        if let ([value], [wanted]) = (&self.values[..], wanted) {
+            return Ok(vec![wanted / value]);
+        }
+        let singular = |error: crate::foam::solve::FactorError| {
+            EvolverError::Numerical(format!("the fixed volumes and quantities cannot be held: {error}"))
+        };
+        let pattern = SymmetricPattern::new(self.held.len(), &self.entries).map_err(singular)?;
+        pattern.factor(&self.values).and_then(|factor| factor.solve(wanted)).map_err(singular)
+    }
+
+    /// What is missing from the targets, and the sum of the errors in units of the tolerance.
+    fn missing(&self, problem: &Problem, values: &Values) -> (Vec<f64>, f64) {
+        let mut error = 0.0;
+        let missing = self
+            .held
+            .iter()
+            .map(|&id| {
+                let target = problem.functionals()[id].target.unwrap_or(0.0);
+                let missing = target - values.functionals[id];
+                error += missing.abs() / TARGET_TOLERANCE;
+                missing
+            })
+            .collect();
+        (missing, error)
+    }
+
+    fn push(&self, problem: &Problem, state: &mut State, factors: &[f64], scale: f64) {
+        for vertex in problem.holds.ids() {
+            let mut velocity = DVec3::ZERO;
+            for (id, own) in self.velocities.at(vertex) {
+                if let Some(row) = self.row[id] {
+                    velocity += factors[row as usize] * own;
+                }
+            }
+            if velocity != DVec3::ZERO {
+                problem.push(state, vertex, velocity, scale);
+            }
+            problem.settle(state, vertex, false);
+        }
+    }
+
+    /// Restores the functionals to their targets along their gradients; the values afterwards.
+    pub(crate) fn restore(&self, problem: &Problem, state: &mut State) -> Result<Values, EvolverError> {
+        let mut values = problem.values(&state.places);
+        if self.held.is_empty() {
+            return Ok(values);
+        }
+        let (mut missing, mut error) = self.missing(problem, &values);
+        let mut fresh: Option<Self> = None;
+        for step in 0..RESTORATIONS {
+            if error <= 0.0 || error.is_nan() {
+                break;
+            }
+            let basis = fresh.as_ref().unwrap_or(self);
+            let factors = basis.combination(&missing)?;
+            basis.push(problem, state, &factors, 1.0);
+            values = problem.values(&state.places);
+            let before = error;
+            (missing, error) = self.missing(problem, &values);
+            if error <= 1.0 {
+                break;
+            }
+            if error > 0.5 * before && step + 1 < RESTORATIONS {
+                // No good progress: the gradients are old.
+                let slots = problem.gradients(&state.places, problem.slots()).functionals;
+                fresh = Some(Self::new(problem, state, &slots));
+            }
+        }
+        Ok(values)
+    }
+}
+
+/// Up to this many functionals products are summed in a full matrix, which is faster to fill.
+const DENSE: usize = 64;
+
+/// What is added to the diagonal of the functionals' products, relative to the largest.
+const STIFFENING: f64 = 1e-13;
+
+impl Problem {
+    pub(super) fn moves_on_boundary(&self, vertex: VertexId) -> bool {
+        matches!(self.holds[vertex], super::freedom::Hold::Boundary(_))
+    }
+
+    /// The force within the constraints and the multipliers of the functionals.
+    pub(crate) fn force(
+        &self,
+        state: &State,
+        gradients: &Gradients,
+        restoring: &Restoring,
+    ) -> Result<(IndexVec<VertexId, DVec3>, IndexVec<FunctionalId, f64>), EvolverError> {
+        let mut force: IndexVec<VertexId, DVec3> =
+            self.holds.ids().map(|vertex| self.projected(state, vertex, -gradients.energy[vertex])).collect();
+        let mut load = vec![0.0; restoring.held.len()];
+        for vertex in self.holds.ids() {
+            for (id, gradient) in restoring.velocities.at(vertex) {
+                if let Some(row) = restoring.row[id] {
+                    load[row as usize] += force[vertex].dot(gradient);
+                }
+            }
+        }
+        let factors = restoring.combination(&load)?;
+        for vertex in self.holds.ids() {
+            for (id, velocity) in restoring.velocities.at(vertex) {
+                if let Some(row) = restoring.row[id] {
+                    force[vertex] = force[vertex] - factors[row as usize] * velocity;
+                }
+            }
+        }
+        let mut multipliers = IndexVec::from_elem(0.0, self.functionals().len());
+        for (&id, factor) in restoring.held.iter().zip(factors) {
+            multipliers[id] = -factor;
+        }
+        Ok((force, multipliers))
+    }
+
+    /// One step down.
+    ///
+    /// # Errors
+    /// [`EvolverError::Numerical`] if the energy is no number.
+    pub(crate) fn descend(
+        &self,
+        state: &mut State,
+        descent: &mut Descent,
+        slots: Slots,
+    ) -> Result<(Descended, Slots), EvolverError> {
+        let gradients = self.gradients(&state.places, slots);
+        if self.walls.iter().any(|wall| wall.side != crate::evolver::datafile::Side::On) {
+            let downhill = gradients.energy.iter().map(|g| -*g).collect();
+            self.release(state, &downhill);
+        }
+        let restoring = Restoring::new(self, state, &gradients.functionals);
+        let (force, multipliers) = self.force(state, &gradients, &restoring)?;
+        let direction = descent.direction(force);
+        let trial = Trial { problem: self, state, direction: &direction, restoring: &restoring };
+        let (mut scale, mut stuck) = (descent.scale, false);
+        let (moved, values) = if descent.fixed {
+            trial.at(scale, true)?
+        } else {
+            let found = trial.optimum(descent)?;
+            (scale, stuck) = (found.scale, found.stuck);
+            let best = trial.at(scale, true)?;
+            if best.1.energy > found.energy {
+                // The parabola missed: the scale that is known to lower the energy.
+                scale = found.lowering;
+                trial.at(scale, true)?
+            } else {
+                best
+            }
+        };
+        if !values.energy.is_finite() {
+            let message = "the step gives no finite energy; the surface stays where it was".to_owned();
+            return Err(EvolverError::Numerical(message));
+        }
+        *state = moved;
+        descent.scale = scale;
+        Ok((Descended { values, scale, multipliers, stuck }, gradients.functionals))
+    }
+}
+
+impl Descent {
+    /// Forgets earlier directions.
+    pub(crate) fn restart(&mut self) {
+        self.memory = None;
+    }
+
+    /// The direction of this step: the force, or one conjugate to those before (Polak and Ribière).
+    fn direction(&mut self, force: IndexVec<VertexId, DVec3>) -> IndexVec<VertexId, DVec3> {
+        if !self.conjugate {
+            return force;
+        }
+        let dot = |a: &IndexVec<VertexId, DVec3>, b: &IndexVec<VertexId, DVec3>| -> f64 {
+            a.iter().zip(b.iter()).map(|(a, b)| a.dot(*b)).sum()
+        };
+        let norm = dot(&force, &force);
+        let direction = match &self.memory {
+            Some(memory) if memory.force.len() == force.len() && memory.norm > 0.0 => {
+                let gamma = ((norm - dot(&force, &memory.force)) / memory.norm).max(0.0);
+                force.iter().zip(memory.direction.iter()).map(|(f, d)| *f + gamma * *d).collect()
+            }
+            _ => force.clone(),
+        };
+        self.memory = Some(Memory { force, direction: direction.clone(), norm });
+        direction
+    }
+}
+
+/// Trials along one direction.
+struct Trial<'a> {
+    problem: &'a Problem,
+    state: &'a State,
+    direction: &'a IndexVec<VertexId, DVec3>,
+    restoring: &'a Restoring,
+}
+
+impl Trial<'_> {
+    fn at(&self, scale: f64, last: bool) -> Result<(State, Values), EvolverError> {
+        let mut state = self.state.clone();
+        for vertex in self.problem.holds.ids() {
+            self.problem.push(&mut state, vertex, self.direction[vertex], scale);
+            self.problem.settle(&mut state, vertex, last);
+        }
+        let values = self.restoring.restore(self.problem, &mut state)?;
+        Ok((state, values))
+    }
+
+    fn energy(&self, scale: f64) -> Result<f64, EvolverError> {
+        let energy = self.at(scale, false)?.1.energy;
+        Ok(if energy.is_finite() { energy } else { f64::MAX })
+    }
+
+    /// The scale of least energy by three trials and a parabola.
+    fn optimum(&self, descent: &Descent) -> Result<Optimum, EvolverError> {
+        let limit = descent.limit;
+        let mut scale = descent.scale.min(limit);
+        if scale <= 0.0 {
+            scale = 1e-6 * limit;
+        }
+        let (mut first, mut e_first) = (scale, self.energy(scale)?);
+        let e_zero = self.energy(0.0)?;
+        let (mut second, mut e_second) = (first, e_first);
+        if e_first < e_zero {
+            loop {
+                scale *= 2.0;
+                (second, e_second) = (scale, self.energy(scale)?);
+                if e_second > e_first {
+                    scale *= 0.5;
+                    break;
+                }
+                (first, e_first) = (second, e_second);
+                if scale >= limit {
+                    break;
+                }
+            }
+        } else {
+            let mut tries = 0;
+            while e_first >= e_zero {
+                tries += 1;
+                if tries > HALVINGS || scale < 1e-12 * limit {
+                    return Ok(Optimum { scale: 0.0, stuck: true, energy: e_zero, lowering: 0.0 });
+                }
+                (second, e_second) = (first, e_first);
+                scale *= 0.5;
+                (first, e_first) = (scale, self.energy(scale)?);
+            }
+        }
+        if scale <= limit {
+            let denominator = e_zero * (first - second) + e_first * second - e_second * first;
+            let numerator = (e_zero - e_second) * first * first + (e_first - e_zero) * second * second;
+            let parabola = 0.5 * numerator / denominator;
+            scale = if parabola.is_finite() { parabola.max(0.0) } else { first };
+        }
+        Ok(Optimum { scale: scale.min(limit), stuck: false, energy: e_zero, lowering: first })
+    }
+}
+
+/// What trials along a direction have found.
+struct Optimum {
+    scale: f64,
+    /// Whether no scale lowers the energy.
+    stuck: bool,
+    /// The energy without a step.
+    energy: f64,
+    /// A scale that lowers it.
+    lowering: f64,
+}

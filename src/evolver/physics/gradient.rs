@@ -1,0 +1,328 @@
+//! Gradients of the energy and of the functionals, by vertex; and the Lagrangian's blocks, element by element.
+
+use super::{
+    Places,
+    edge::{self, EdgeField},
+    facet::FacetField,
+    problem::{Destination, EdgePart, FunctionalId, Problem, shifted},
+};
+use crate::{
+    evolver::surface::VertexId,
+    foam::energy::Blocks,
+    index::{Id, IndexVec},
+};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Which functionals depend on a vertex, and their gradients there, vertex after vertex.
+#[derive(Clone, Debug)]
+pub(crate) struct Slots {
+    starts: Vec<u32>,
+    ids: Vec<FunctionalId>,
+    pub(crate) values: Vec<DVec3>,
+}
+
+impl Slots {
+    /// The places of a vertex's entries.
+    pub(crate) fn range(&self, vertex: usize) -> std::ops::Range<usize> {
+        self.starts[vertex] as usize..self.starts[vertex + 1] as usize
+    }
+
+    /// The functionals that depend on a vertex with their gradients there.
+    pub(crate) fn at(&self, vertex: VertexId) -> impl Iterator<Item = (FunctionalId, DVec3)> + '_ {
+        let range = self.range(vertex.index());
+        self.ids[range.clone()].iter().copied().zip(self.values[range].iter().copied())
+    }
+
+    fn add(&mut self, vertex: u32, id: FunctionalId, value: DVec3) {
+        let range = self.range(vertex as usize);
+        for slot in range {
+            if self.ids[slot] == id {
+                self.values[slot] += value;
+                return;
+            }
+        }
+    }
+}
+
+/// Gradients of the energy, couplings included, and of the held functionals.
+#[derive(Clone, Debug)]
+pub(crate) struct Gradients {
+    pub(crate) energy: IndexVec<VertexId, DVec3>,
+    pub(crate) functionals: Slots,
+}
+
+/// The factor of each destination in a sum of energy and functionals.
+#[derive(Clone, Debug)]
+pub(crate) struct Weights {
+    pub(crate) energy: f64,
+    pub(crate) functionals: IndexVec<FunctionalId, f64>,
+}
+
+impl Weights {
+    /// The Lagrangian with these multipliers.
+    pub(crate) fn lagrangian(problem: &Problem, multipliers: &IndexVec<FunctionalId, f64>) -> Self {
+        let functionals = problem
+            .functionals
+            .enumerated()
+            .map(|(id, functional)| functional.coupling - multipliers[id])
+            .collect();
+        Self { energy: 1.0, functionals }
+    }
+
+    fn of(&self, destination: Destination) -> f64 {
+        match destination {
+            Destination::Energy => self.energy,
+            Destination::Functional(id) => self.functionals[id],
+        }
+    }
+}
+
+/// The gradient and the Hessian of one element's share.
+pub(super) struct Local {
+    pub(super) nodes: [u32; 6],
+    pub(super) count: usize,
+    pub(super) gradient: [DVec3; 6],
+    pub(super) hessian: Blocks,
+}
+
+impl Problem {
+    /// The pattern of the functionals by vertex, with zero gradients.
+    pub(crate) fn slots(&self) -> Slots {
+        let held: Vec<bool> = self.functionals.iter().map(|functional| functional.target.is_some()).collect();
+        let mut pairs: Vec<(u32, FunctionalId)> = Vec::new();
+        let mut note = |nodes: &[u32], destination: Destination| {
+            if let Destination::Functional(id) = destination
+                && held[id.index()]
+            {
+                pairs.extend(nodes.iter().map(|&node| (node, id)));
+            }
+        };
+        for term in &self.facets {
+            self.facet_parts[term.parts()].iter().for_each(|part| note(term.nodes(), part.destination));
+        }
+        for term in &self.edges {
+            self.edge_parts[term.parts()].iter().for_each(|part| note(term.nodes(), part.destination));
+        }
+        for point in &self.points {
+            note(&[crate::index::checked_u32(point.vertex.index())], point.destination);
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut starts = vec![0; self.holds.len() + 1];
+        for (node, _) in &pairs {
+            starts[*node as usize + 1] += 1;
+        }
+        for at in 1..starts.len() {
+            starts[at] += starts[at - 1];
+        }
+        let ids: Vec<FunctionalId> = pairs.into_iter().map(|(_, id)| id).collect();
+        Slots { values: vec![DVec3::ZERO; ids.len()], starts, ids }
+    }
+
+    /// The gradients at `places`; `slots` is a pattern of this problem.
+    pub(crate) fn gradients(&self, places: &Places, mut slots: Slots) -> Gradients {
+        slots.values.fill(DVec3::ZERO);
+        let mut energy = vec![DVec3::ZERO; places.len()];
+        self.facet_gradients(places.as_slice(), &mut energy, &mut slots);
+        let mut local = [DVec3::ZERO; 6];
+        for term in &self.edges {
+            let nodes = term.places(places.as_slice());
+            let nodes = &nodes[..usize::from(term.count)];
+            let rule = self.rule(nodes.len());
+            if term.tension.abs() > 0.0 {
+                local.fill(DVec3::ZERO);
+                EdgeField::Length.add(term.tension, rule, nodes, &mut local, None);
+                self.pass(term.nodes(), &local, Destination::Energy, &mut energy, &mut slots);
+            }
+            for part in &self.edge_parts[term.parts()] {
+                local.fill(DVec3::ZERO);
+                self.edge_part(part, nodes, part.weight, &mut local, None);
+                self.pass(term.nodes(), &local, part.destination, &mut energy, &mut slots);
+            }
+        }
+        for point in &self.points {
+            let slope = point.weight * point.field.jet(places[point.vertex]).gradient;
+            let node = [crate::index::checked_u32(point.vertex.index())];
+            self.pass(&node, &[slope], point.destination, &mut energy, &mut slots);
+        }
+        Gradients { energy: energy.into(), functionals: slots }
+    }
+
+    fn facet_gradients(&self, places: &[DVec3], energy: &mut [DVec3], slots: &mut Slots) {
+        let mut local = [DVec3::ZERO; 6];
+        for term in &self.facets {
+            let nodes = term.places(places);
+            let nodes = &nodes[..usize::from(term.count)];
+            if term.tension.abs() > 0.0 {
+                if let [a, b, c] = nodes {
+                    // ∂|n|/∂a = (b − c) × n/|n| and round the corners; the area is half of |n|.
+                    let n = (*b - *a).cross(*c - *a);
+                    let unit = 0.5 * term.tension / n.length() * n;
+                    for (&node, far) in term.nodes().iter().zip([*c - *b, *a - *c, *b - *a]) {
+                        energy[node as usize] += unit.cross(far);
+                    }
+                } else {
+                    local.fill(DVec3::ZERO);
+                    FacetField::Area.add(term.tension, nodes, &mut local, None);
+                    self.pass(term.nodes(), &local, Destination::Energy, energy, slots);
+                }
+            }
+            for part in &self.facet_parts[term.parts()] {
+                local.fill(DVec3::ZERO);
+                let field = &self.facet_fields[part.field as usize];
+                match shifted(nodes, part.offset) {
+                    Some(moved) => field.add(part.weight, &moved[..nodes.len()], &mut local, None),
+                    None => field.add(part.weight, nodes, &mut local, None),
+                }
+                self.pass(term.nodes(), &local, part.destination, energy, slots);
+            }
+        }
+    }
+
+    fn pass(
+        &self,
+        nodes: &[u32],
+        local: &[DVec3],
+        destination: Destination,
+        energy: &mut [DVec3],
+        slots: &mut Slots,
+    ) {
+        match destination {
+            Destination::Energy => {
+                for (&node, &value) in nodes.iter().zip(local) {
+                    energy[node as usize] += value;
+                }
+            }
+            Destination::Functional(id) => {
+                let functional = &self.functionals[id];
+                if functional.coupling.abs() > 0.0 {
+                    for (&node, &value) in nodes.iter().zip(local) {
+                        energy[node as usize] += functional.coupling * value;
+                    }
+                }
+                if functional.target.is_some() {
+                    for (&node, &value) in nodes.iter().zip(local) {
+                        slots.add(node, id, value);
+                    }
+                }
+            }
+        }
+    }
+
+    fn edge_part(
+        &self,
+        part: &super::problem::Part,
+        nodes: &[DVec3],
+        factor: f64,
+        gradient: &mut [DVec3; 6],
+        hessian: Option<&mut Blocks>,
+    ) {
+        let count = nodes.len();
+        let mut moved = [DVec3::ZERO; 3];
+        for (to, from) in moved.iter_mut().zip(nodes) {
+            *to = *from + part.offset;
+        }
+        match &self.edge_fields[part.field as usize] {
+            EdgePart::Field(field) => {
+                field.add(factor, self.rule(count), &moved[..count], gradient, hessian);
+            }
+            EdgePart::Gap(wall) => {
+                edge::add_gap(factor, wall, nodes, gradient);
+                if let Some(hessian) = hessian {
+                    edge::add_gap_hessian(factor, wall, nodes, hessian);
+                }
+            }
+        }
+    }
+
+    /// Gradient and Hessian of every element's share of the weighted sum; elements without a share are left out.
+    pub(super) fn locals(&self, places: &Places, weights: &Weights) -> Vec<Local> {
+        let places = places.as_slice();
+        let mut out: Vec<Local> =
+            self.facets.par_iter().filter_map(|term| self.facet_local(term, places, weights)).collect();
+        let edges: Vec<Local> =
+            self.edges.par_iter().filter_map(|term| self.edge_local(term, places, weights)).collect();
+        out.extend(edges);
+        for point in &self.points {
+            let jet = point.field.jet(places[point.vertex.index()]);
+            let factor = weights.of(point.destination) * point.weight;
+            let mut local = Local::new(&[crate::index::checked_u32(point.vertex.index())]);
+            local.gradient[0] = factor * jet.gradient;
+            local.hessian.add(0, 0, factor * jet.hessian);
+            out.push(local);
+        }
+        out
+    }
+
+    fn facet_local(
+        &self,
+        term: &super::problem::Term<6>,
+        places: &[DVec3],
+        weights: &Weights,
+    ) -> Option<Local> {
+        let parts = &self.facet_parts[term.parts()];
+        if term.tension.abs() <= 0.0 && parts.is_empty() {
+            return None;
+        }
+        let nodes = term.places(places);
+        let nodes = &nodes[..usize::from(term.count)];
+        let mut local = Local::new(term.nodes());
+        if term.tension.abs() > 0.0 {
+            let factor = weights.energy * term.tension;
+            FacetField::Area.add(factor, nodes, &mut local.gradient, Some(&mut local.hessian));
+        }
+        for part in parts {
+            let factor = weights.of(part.destination) * part.weight;
+            if factor.abs() <= 0.0 {
+                continue;
+            }
+            let field = &self.facet_fields[part.field as usize];
+            let moved = shifted(nodes, part.offset);
+            let seen = moved.as_ref().map_or(nodes, |moved| &moved[..nodes.len()]);
+            field.add(factor, seen, &mut local.gradient, Some(&mut local.hessian));
+        }
+        Some(local)
+    }
+
+    fn edge_local(
+        &self,
+        term: &super::problem::Term<3>,
+        places: &[DVec3],
+        weights: &Weights,
+    ) -> Option<Local> {
+        let parts = &self.edge_parts[term.parts()];
+        if term.tension.abs() <= 0.0 && parts.is_empty() {
+            return None;
+        }
+        let nodes = term.places(places);
+        let nodes = &nodes[..usize::from(term.count)];
+        let mut local = Local::new(term.nodes());
+        if term.tension.abs() > 0.0 {
+            let factor = weights.energy * term.tension;
+            let rule = self.rule(nodes.len());
+            EdgeField::Length.add(factor, rule, nodes, &mut local.gradient, Some(&mut local.hessian));
+        }
+        for part in parts {
+            let factor = weights.of(part.destination) * part.weight;
+            if factor.abs() > 0.0 {
+                let Local { gradient, hessian, .. } = &mut local;
+                self.edge_part(part, nodes, factor, gradient, Some(hessian));
+            }
+        }
+        Some(local)
+    }
+}
+
+impl Local {
+    fn new(nodes: &[u32]) -> Self {
+        let mut all = [0; 6];
+        all[..nodes.len()].copy_from_slice(nodes);
+        Self {
+            nodes: all,
+            count: nodes.len(),
+            gradient: [DVec3::ZERO; 6],
+            hessian: Blocks::zero(nodes.len()),
+        }
+    }
+}

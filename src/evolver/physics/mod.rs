@@ -1,0 +1,36 @@
+//! The energy of a surface and what is held constant, with exact derivatives.
+//!
+//! The Lagrangian is `E + Σ cₖ Fₖ − Σ pₖ Fₖ`: tension times area and length, gravity and the constraints' integrals in `E`; the
+//! functionals `Fₖ` are the bodies' volumes and the named quantities, coupled with prescribed pressures or moduli `cₖ` and
+//! held with multipliers `pₖ`.
+//!
+//! | step | file |
+//! |---|---|
+//! | fields to be integrated, with derivatives | `field.rs` |
+//! | one facet, one edge: integral, gradient, Hessian; areas are the foam's elements | `facet.rs`, `edge.rs` |
+//! | all terms of a surface; energy and functionals | `problem.rs`, `terms.rs` |
+//! | gradients, and volumes' gradients by vertex | `gradient.rs` |
+//! | directions in which vertices may move; return to constraints | `freedom.rs` |
+//! | gradient steps with volumes held | `descend.rs` |
+//! | Newton steps, inertia, eigenvalues; the foam's sparse solver | `newton.rs` |
+//! | volumes closed on the walls themselves, by the foam's kernels | `closed.rs` |
+
+pub(crate) mod closed;
+pub(crate) mod descend;
+mod edge;
+mod facet;
+mod field;
+pub(crate) mod freedom;
+mod gradient;
+pub(crate) mod newton;
+mod problem;
+pub(crate) mod terms;
+
+pub use problem::{Functional, FunctionalId, Measured, Problem, Values};
+
+use super::surface::VertexId;
+use crate::index::IndexVec;
+use glam::DVec3;
+
+/// The places of the vertices.
+pub type Places = IndexVec<VertexId, DVec3>;

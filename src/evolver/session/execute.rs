@@ -1,0 +1,580 @@
+//! Statements, one by one.
+
+use super::{
+    Host, Session,
+    evaluate::{Element, Scope},
+    format::{Argument, printf, significant},
+};
+use crate::{
+    evolver::{
+        command::{Action, Assignment, Simple, Statement},
+        datafile::Purpose,
+        error::EvolverError,
+        language::{
+            expression::{ElementKind, Expression, Query},
+            formula::is_zero,
+        },
+        physics::FunctionalId,
+        source::{Position, Source},
+        surface::{BodyId, EdgeId, FacetId, VertexId},
+    },
+    index::Id,
+};
+use std::sync::Arc;
+
+/// How a statement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// It ran to its end.
+    Next,
+    /// `break`.
+    Break,
+    /// `continue`.
+    Continue,
+    /// `return`.
+    Return,
+    /// `quit`.
+    Quit,
+}
+
+type Ran = Result<Flow, EvolverError>;
+
+/// Collects what a redirected statement prints.
+struct Collected<'a> {
+    host: &'a mut dyn Host,
+    text: String,
+}
+
+impl Host for Collected<'_> {
+    fn print(&mut self, text: &str) {
+        self.text.push_str(text);
+    }
+
+    fn write(&mut self, name: &str, text: &str, append: bool) -> Result<(), std::io::Error> {
+        self.host.write(name, text, append)
+    }
+
+    fn interrupted(&self) -> bool {
+        self.host.interrupted()
+    }
+}
+
+impl Session {
+    /// Runs statements from one text.
+    ///
+    /// # Errors
+    /// The first [`EvolverError`]; the surface is as the statements before left it.
+    pub fn run(&mut self, source: &Arc<Source>, statements: &[Statement], host: &mut dyn Host) -> Ran {
+        let mut scope = Scope::new(Some(source.clone()));
+        for statement in statements {
+            if self.execute(statement, &mut scope, host)? == Flow::Quit {
+                return Ok(Flow::Quit);
+            }
+        }
+        Ok(Flow::Next)
+    }
+
+    /// Counts a command against the budget.
+    pub(super) fn spend(&mut self) -> Result<(), EvolverError> {
+        self.spent += 1;
+        if self.spent > self.budget { Err(EvolverError::Budget(self.budget)) } else { Ok(()) }
+    }
+
+    pub(super) fn execute(&mut self, statement: &Statement, scope: &mut Scope, host: &mut dyn Host) -> Ran {
+        self.spend()?;
+        if host.interrupted() {
+            return Err(EvolverError::Interrupted);
+        }
+        match &statement.action {
+            Action::Block(statements) => {
+                for statement in statements {
+                    let flow = self.execute(statement, scope, host)?;
+                    if flow != Flow::Next {
+                        return Ok(flow);
+                    }
+                }
+                Ok(Flow::Next)
+            }
+            Action::Repeat(body, count) => {
+                let count = self.evaluate(count, scope)?;
+                let mut done = 0.0;
+                while done < count {
+                    done += 1.0;
+                    match self.execute(body, scope, host)? {
+                        Flow::Next | Flow::Continue => {}
+                        Flow::Break => break,
+                        flow => return Ok(flow),
+                    }
+                }
+                Ok(Flow::Next)
+            }
+            Action::If(test, yes, no) => {
+                if !is_zero(self.evaluate(test, scope)?) {
+                    self.execute(yes, scope, host)
+                } else if let Some(no) = no {
+                    self.execute(no, scope, host)
+                } else {
+                    Ok(Flow::Next)
+                }
+            }
+            Action::While(..) | Action::DoWhile(..) | Action::For(..) => {
+                self.repeat(&statement.action, scope, host)
+            }
+            Action::Foreach(query, body) => self.foreach(query, body, scope, host),
+            Action::Redirect(body, name, append) => self.redirect(body, name, *append, scope, host),
+            Action::Call(name) => self.call_procedure(name, statement.position, scope, host),
+            Action::Simple(Simple::Break) => Ok(Flow::Break),
+            Action::Simple(Simple::Continue) => Ok(Flow::Continue),
+            Action::Simple(Simple::Return) => Ok(Flow::Return),
+            Action::Simple(Simple::Quit) => Ok(Flow::Quit),
+            other => {
+                self.act(other, statement.position, scope, host)?;
+                Ok(Flow::Next)
+            }
+        }
+    }
+
+    fn repeat(&mut self, action: &Action, scope: &mut Scope, host: &mut dyn Host) -> Ran {
+        let (test, body, next) = match action {
+            Action::While(test, body) | Action::DoWhile(body, test) => (test, body, None),
+            Action::For(parts, test, body) => {
+                self.execute(&parts[0], scope, host)?;
+                (test, body, Some(&parts[1]))
+            }
+            _ => return Ok(Flow::Next),
+        };
+        let mut first = matches!(action, Action::DoWhile(..));
+        loop {
+            self.spend()?;
+            if !std::mem::take(&mut first) && is_zero(self.evaluate(test, scope)?) {
+                return Ok(Flow::Next);
+            }
+            match self.execute(body, scope, host)? {
+                Flow::Next | Flow::Continue => {}
+                Flow::Break => return Ok(Flow::Next),
+                flow => return Ok(flow),
+            }
+            if let Some(next) = next {
+                self.execute(next, scope, host)?;
+            }
+        }
+    }
+
+    fn foreach(&mut self, query: &Query, body: &Statement, scope: &mut Scope, host: &mut dyn Host) -> Ran {
+        for element in self.found(query, scope)? {
+            if element.index >= self.count(element.kind) {
+                break;
+            }
+            let mut inner = scope.with(query.name.clone(), element);
+            match self.execute(body, &mut inner, host)? {
+                Flow::Next | Flow::Continue => {}
+                Flow::Break => break,
+                flow => return Ok(flow),
+            }
+        }
+        Ok(Flow::Next)
+    }
+
+    fn redirect(
+        &mut self,
+        body: &Statement,
+        name: &Expression,
+        append: bool,
+        scope: &mut Scope,
+        host: &mut dyn Host,
+    ) -> Ran {
+        let name = self.text(name, scope)?;
+        let mut collected = Collected { host, text: String::new() };
+        let flow = self.execute(body, scope, &mut collected)?;
+        let Collected { host, text } = collected;
+        host.write(&name, &text, append).map_err(|error| EvolverError::File { name, error })?;
+        Ok(flow)
+    }
+
+    fn call_procedure(
+        &mut self,
+        name: &Arc<str>,
+        position: Position,
+        scope: &mut Scope,
+        host: &mut dyn Host,
+    ) -> Ran {
+        if let Some(procedure) = self.procedures.get(name).cloned() {
+            self.spend()?;
+            self.depth += 1;
+            if self.depth > PROCEDURE_DEPTH {
+                self.depth = 0;
+                return scope.fail(position, format!("«{name}» calls itself without end"));
+            }
+            // A procedure sees no elements of its caller.
+            let mut own = scope.bare();
+            let flow = self.execute(&procedure, &mut own, host);
+            self.depth = self.depth.saturating_sub(1);
+            return Ok(match flow? {
+                Flow::Quit => Flow::Quit,
+                _ => Flow::Next,
+            });
+        }
+        let expression = Expression::Name(name.clone(), position);
+        if let Some(text) = self.texts.get(name) {
+            host.print(&format!("{text}\n"));
+            return Ok(Flow::Next);
+        }
+        match self.evaluate(&expression, scope) {
+            Ok(value) => host.print(&format!("{}\n", significant(value, 15))),
+            Err(EvolverError::Invalid { place, .. }) => {
+                let message = format!("«{name}» is no command, procedure or variable");
+                return Err(EvolverError::Invalid { place, message });
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(Flow::Next)
+    }
+
+    /// Statements that have no statements in them.
+    fn act(
+        &mut self,
+        action: &Action,
+        position: Position,
+        scope: &mut Scope,
+        host: &mut dyn Host,
+    ) -> Result<(), EvolverError> {
+        match action {
+            Action::Assign(name, operator, value) => {
+                let value = self.evaluate(value, scope)?;
+                self.assign(name, *operator, value, position, scope)
+            }
+            Action::AssignText(name, value) => {
+                let text: Arc<str> = self.text(value, scope)?.into();
+                self.texts.insert(name.clone(), text);
+                Ok(())
+            }
+            Action::Define(name, body) => {
+                self.procedures.insert(name.clone(), body.clone());
+                Ok(())
+            }
+            Action::AssignMember(target, operator, value) => {
+                let value = self.evaluate(value, scope)?;
+                self.assign_member(target, *operator, value, position, scope)
+            }
+            Action::Print(Expression::Text(text)) => {
+                host.print(&format!("{text}\n"));
+                Ok(())
+            }
+            Action::Print(value) | Action::Show(value) => {
+                if let Expression::Name(name, _) = value
+                    && let Some(text) = self.texts.get(name)
+                {
+                    host.print(&format!("{text}\n"));
+                    return Ok(());
+                }
+                let value = self.evaluate(value, scope)?;
+                host.print(&format!("{}\n", significant(value, 15)));
+                Ok(())
+            }
+            Action::Printf(format, arguments) => {
+                let text = self.formatted(format, arguments, position, scope)?;
+                host.print(&text);
+                Ok(())
+            }
+            Action::Toggle(name, on) => {
+                self.toggle(name, *on);
+                Ok(())
+            }
+            Action::Dump(name) => {
+                let name = match name {
+                    Some(name) => self.text(name, scope)?,
+                    None => format!("{}.dmp", self.data.source.name),
+                };
+                let text = self.datafile()?;
+                host.write(&name, &text, false).map_err(|error| EvolverError::File { name, error })
+            }
+            Action::DefineAttribute(attribute) => {
+                let at = self.surface.extra_length(attribute.kind);
+                self.surface.attributes.push(attribute.clone());
+                self.surface.lengthen_extra(attribute.kind, at, attribute.length);
+                Ok(())
+            }
+            Action::Histogram(query, value, _) => self.histogram(query, value, scope, host),
+            Action::ListInformation(_) => Ok(()),
+            Action::Refused(what, hint) => scope.unsupported(position, what, hint),
+            Action::Set(query, name, index, value) => {
+                self.set(query, name, (index.as_ref(), value.as_ref()), position, scope)
+            }
+            Action::Unset(query, name, value) => self.unset(query, name, value.as_ref(), position, scope),
+            Action::Elements(command, target) => self.element_command(*command, target, scope, host),
+            other => self.motion_command(other, position, scope, host),
+        }
+    }
+
+    /// The text of an expression: a text, a variable that holds one, or a formatted one.
+    pub(super) fn text(
+        &mut self,
+        expression: &Expression,
+        scope: &mut Scope,
+    ) -> Result<String, EvolverError> {
+        match expression {
+            Expression::Text(text) => Ok(text.to_string()),
+            Expression::Name(name, _) if self.texts.contains_key(name) => {
+                Ok(self.texts.get(name).map(ToString::to_string).unwrap_or_default())
+            }
+            Expression::Call(name, operands, position) if &**name == "sprintf" => {
+                match operands.split_first() {
+                    Some((format, rest)) => self.formatted(format, rest, *position, scope),
+                    None => scope.fail(*position, "sprintf needs a format"),
+                }
+            }
+            other => Ok(significant(self.evaluate(other, scope)?, 15)),
+        }
+    }
+
+    fn formatted(
+        &mut self,
+        format: &Expression,
+        arguments: &[Expression],
+        position: Position,
+        scope: &mut Scope,
+    ) -> Result<String, EvolverError> {
+        let format = self.text(format, scope)?;
+        let mut values = Vec::with_capacity(arguments.len());
+        for argument in arguments {
+            let is_text = match argument {
+                Expression::Text(_) => true,
+                Expression::Name(name, _) => self.texts.contains_key(name),
+                _ => false,
+            };
+            values.push(if is_text {
+                Argument::Text(self.text(argument, scope)?)
+            } else {
+                Argument::Number(self.evaluate(argument, scope)?)
+            });
+        }
+        match printf(&format, &values) {
+            Ok(text) => Ok(text),
+            Err(message) => scope.fail(position, message),
+        }
+    }
+
+    fn assign(
+        &mut self,
+        name: &str,
+        operator: Assignment,
+        value: f64,
+        position: Position,
+        scope: &mut Scope,
+    ) -> Result<(), EvolverError> {
+        match name {
+            "scale" => {
+                self.descent.scale = combined(self.descent.scale, operator, value);
+                return Ok(());
+            }
+            "scale_limit" => {
+                self.descent.limit = combined(self.descent.limit, operator, value);
+                return Ok(());
+            }
+            "gap_constant" | "spring_constant" => {
+                self.gap = combined(self.gap, operator, value);
+                self.problem = None;
+                return Ok(());
+            }
+            "quiet" => {
+                self.quiet = !is_zero(value);
+                return Ok(());
+            }
+            _ => {}
+        }
+        if let Some(element) = scope.innermost()
+            && operator == Assignment::Set
+            && self.variables.get(name).is_none()
+            && self.attribute(element, name, None)?.is_some()
+        {
+            return self.set_attribute(element, name, None, Assignment::Set, value, position, scope);
+        }
+        let old = match (operator, self.variables.get(name)) {
+            (_, Some(old)) => old,
+            (Assignment::Set, None) => 0.0,
+            (_, None) => return scope.fail(position, format!("«{name}» is not defined")),
+        };
+        self.variables.set(name, combined(old, operator, value));
+        Ok(())
+    }
+
+    fn assign_member(
+        &mut self,
+        target: &Expression,
+        operator: Assignment,
+        value: f64,
+        position: Position,
+        scope: &mut Scope,
+    ) -> Result<(), EvolverError> {
+        match target {
+            Expression::Member(owner, name, at) => {
+                if let Expression::Name(quantity, _) = &**owner
+                    && self.set_quantity(quantity, name, operator, value)?
+                {
+                    return Ok(());
+                }
+                let element = self.element(owner, scope)?;
+                self.set_attribute(element, name, None, operator, value, *at, scope)
+            }
+            Expression::Index(parts, at) => {
+                let index = self.evaluate(&parts[1], scope)?;
+                match &parts[0] {
+                    Expression::Member(owner, name, _) => {
+                        let element = self.element(owner, scope)?;
+                        self.set_attribute(element, name, Some(index), operator, value, *at, scope)
+                    }
+                    _ => scope.fail(*at, "arrays are not supported; use added attributes of elements"),
+                }
+            }
+            _ => scope.fail(position, "only variables and attributes can be assigned to"),
+        }
+    }
+
+    fn set_quantity(
+        &mut self,
+        quantity: &str,
+        name: &str,
+        operator: Assignment,
+        value: f64,
+    ) -> Result<bool, EvolverError> {
+        let Some(at) = self.data.quantities.iter().position(|q| *q.name == *quantity) else {
+            return Ok(false);
+        };
+        let state = &mut self.quantities[at];
+        match (name, state.purpose) {
+            ("modulus", _) => state.modulus = combined(state.modulus, operator, value),
+            ("target", Purpose::Fixed(old)) => state.purpose = Purpose::Fixed(combined(old, operator, value)),
+            _ => return Ok(false),
+        }
+        self.problem = None;
+        Ok(true)
+    }
+
+    /// Sets one attribute of one element.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "an attribute, its index, how, to what, and where it is said"
+    )]
+    pub(super) fn set_attribute(
+        &mut self,
+        element: Element,
+        name: &str,
+        index: Option<f64>,
+        operator: Assignment,
+        value: f64,
+        position: Position,
+        scope: &Scope,
+    ) -> Result<(), EvolverError> {
+        let old = self.attribute(element, name, index)?.unwrap_or(0.0);
+        let value = combined(old, operator, value);
+        let axis = match (name, index) {
+            ("x" | "x1", None) => Some(0),
+            ("y" | "x2", None) => Some(1),
+            ("z" | "x3", None) => Some(2),
+            ("x", Some(at)) => {
+                super::evaluate::whole(at).and_then(|at| at.checked_sub(1)).filter(|at| *at < 3)
+            }
+            _ => None,
+        };
+        let on = !is_zero(value);
+        #[expect(clippy::cast_possible_truncation, reason = "colours and numbers of elements are small")]
+        let small = value as i32;
+        if let Some(place) = self.extra_place(element.kind, name, index) {
+            self.set_extra(element, place, value);
+            return Ok(());
+        }
+        match (element.kind, name) {
+            (ElementKind::Vertex, _) if axis.is_some() => {
+                self.surface.vertices[VertexId::from_index(element.index)].position[axis.unwrap_or(0)] =
+                    value;
+            }
+            (ElementKind::Vertex, "p1") => {
+                self.surface.vertices[VertexId::from_index(element.index)].parameters[0] = value;
+            }
+            (ElementKind::Vertex, "p2") => {
+                self.surface.vertices[VertexId::from_index(element.index)].parameters[1] = value;
+            }
+            (ElementKind::Edge, "tension" | "density") => {
+                self.surface.edges[EdgeId::from_index(element.index)].tension = value;
+            }
+            (ElementKind::Facet, "tension" | "density") => {
+                self.surface.facets[FacetId::from_index(element.index)].tension = value;
+            }
+            (ElementKind::Edge, "no_refine") => {
+                self.surface.edges[EdgeId::from_index(element.index)].no_refine = on
+            }
+            (ElementKind::Facet, "no_refine") => {
+                self.surface.facets[FacetId::from_index(element.index)].no_refine = on
+            }
+            (ElementKind::Body, _) => {
+                return self.set_body(BodyId::from_index(element.index), name, value, position, scope);
+            }
+            (_, "color" | "frontcolor" | "backcolor") => {
+                if let Some(common) = self.common_mut(element) {
+                    common.color = small;
+                }
+                return Ok(());
+            }
+            (_, "fixed") => {
+                if let Some(common) = self.common_mut(element) {
+                    common.fixed = on;
+                }
+            }
+            (_, "original") => {
+                if let Some(common) = self.common_mut(element) {
+                    common.original = i64::from(small);
+                }
+                return Ok(());
+            }
+            (_, "opacity" | "bare" | "no_display") => return Ok(()),
+            _ => {
+                let message = format!("the attribute «{name}» of a {} cannot be set", element.kind.name());
+                return scope.fail(position, message);
+            }
+        }
+        self.problem = None;
+        Ok(())
+    }
+
+    fn set_body(
+        &mut self,
+        id: BodyId,
+        name: &str,
+        value: f64,
+        position: Position,
+        scope: &Scope,
+    ) -> Result<(), EvolverError> {
+        let body = &mut self.surface.bodies[id];
+        match name {
+            "target" | "volume" => {
+                body.target = Some(value);
+                body.prescribed = false;
+            }
+            "pressure" => {
+                body.pressure = value;
+                body.prescribed = true;
+                body.target = None;
+                self.multipliers[FunctionalId::from_index(id.index())] = 0.0;
+            }
+            "density" => body.density = value,
+            "volconst" => body.volconst = value,
+            _ => return scope.fail(position, format!("the attribute «{name}» of a body cannot be set")),
+        }
+        self.problem = None;
+        Ok(())
+    }
+}
+
+/// How deep procedures may call procedures.
+const PROCEDURE_DEPTH: usize = 60;
+
+/// The value after an assignment.
+pub(super) fn combined(old: f64, operator: Assignment, value: f64) -> f64 {
+    match operator {
+        Assignment::Set => value,
+        Assignment::Add => old + value,
+        Assignment::Subtract => old - value,
+        Assignment::Multiply => old * value,
+        Assignment::Divide => old / value,
+    }
+}

@@ -1,0 +1,321 @@
+//! A surface with its commands: what `run` does.
+//!
+//! | part | file |
+//! |---|---|
+//! | the state; energies kept up to date | this page |
+//! | statements: loops, assignments, procedures | `execute.rs` |
+//! | values of expressions | `evaluate.rs`, `attributes.rs` |
+//! | moving the surface: `g`, `hessian`, `V` and their kin | `motion.rs` |
+//! | changing and listing elements | `elements.rs` |
+//! | text with formats | `format.rs` |
+//! | datafiles | `dump.rs` |
+
+mod attributes;
+mod dump;
+mod elements;
+mod evaluate;
+mod execute;
+mod format;
+mod motion;
+
+pub use execute::Flow;
+pub use format::significant;
+
+use super::{
+    command::Statement,
+    datafile::{Datafile, Purpose},
+    error::EvolverError,
+    language::formula::{GRAVITY, Variables},
+    open::Document,
+    physics::{
+        FunctionalId, Problem, Values,
+        closed::closed_volumes,
+        descend::Descent,
+        freedom::State,
+        terms::{Conditions, QuantityState},
+    },
+    surface::{BodyId, Neighbours, Surface},
+};
+use crate::index::{Id, IndexVec};
+use std::{collections::BTreeMap, sync::Arc};
+
+/// What a session asks of the program around it.
+pub trait Host {
+    /// Shows text.
+    fn print(&mut self, text: &str);
+    /// Writes a file, whole or at its end.
+    ///
+    /// # Errors
+    /// Why it cannot be written.
+    fn write(&mut self, name: &str, text: &str, append: bool) -> Result<(), std::io::Error>;
+    /// Whether to stop.
+    fn interrupted(&self) -> bool;
+}
+
+/// A surface, its variables and procedures.
+pub struct Session {
+    pub(super) data: Datafile,
+    pub(super) surface: Surface,
+    pub(super) variables: Variables,
+    texts: BTreeMap<Arc<str>, Arc<str>>,
+    procedures: BTreeMap<Arc<str>, Arc<Statement>>,
+    quantities: Vec<QuantityState>,
+    multipliers: IndexVec<FunctionalId, f64>,
+    gravity: bool,
+    gap: f64,
+    descent: Descent,
+    normal: bool,
+    quiet: bool,
+    eigenvalue: f64,
+    /// How many commands may still run.
+    budget: u64,
+    spent: u64,
+    depth: usize,
+    problem: Option<Current>,
+    /// Who borders on whom, as long as that stays.
+    around: Option<Arc<Neighbours>>,
+}
+
+/// A problem that belongs to the present surface, with its values.
+struct Current {
+    problem: Problem,
+    state: State,
+    values: Values,
+    /// The values of the variables that formulas use, as they were.
+    inputs: Vec<f64>,
+}
+
+/// Commands that a session runs before it believes that a loop does not end.
+pub const COMMAND_BUDGET: u64 = 10_000_000;
+
+/// By how much of a body's volume the two ways to measure it may differ: the coarsest contact lines in use cut off less than a
+/// percent.
+const PARTED: f64 = 0.02;
+
+/// The volumes of a body by its integrals and by its closed surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyReport {
+    /// The body's number.
+    pub id: i64,
+    /// The volume that it shall have.
+    pub target: Option<f64>,
+    /// The volume by the datafile's integrals.
+    pub volume: f64,
+    /// The volume of the body closed on its walls, where that is possible.
+    pub closed: Option<f64>,
+    /// The pressure.
+    pub pressure: f64,
+}
+
+impl Session {
+    /// A session with the surface of a datafile, its vertices brought onto their constraints.
+    ///
+    /// # Errors
+    /// [`EvolverError`] if the surface makes no sense.
+    pub fn new(document: Document) -> Result<Self, EvolverError> {
+        let Document { data, surface, .. } = document;
+        let quantities = data
+            .quantities
+            .iter()
+            .map(|q| QuantityState { purpose: q.purpose, modulus: q.modulus })
+            .collect();
+        let mut descent = Descent::default();
+        if let Some((scale, fixed)) = data.scale {
+            (descent.scale, descent.fixed) = (scale, fixed);
+        }
+        if let Some(limit) = data.scale_limit {
+            descent.limit = limit;
+        }
+        let functionals = surface.bodies.len() + data.quantities.len();
+        let mut multipliers = IndexVec::from_elem(0.0, functionals);
+        for (id, body) in surface.bodies.enumerated() {
+            multipliers[FunctionalId::from_index(id.index())] = body.pressure;
+        }
+        let mut session = Self {
+            variables: data.variables.clone(),
+            gravity: data.gravity,
+            gap: data.gap_constant,
+            data,
+            surface,
+            texts: BTreeMap::new(),
+            procedures: BTreeMap::new(),
+            quantities,
+            multipliers,
+            descent,
+            normal: true,
+            quiet: false,
+            eigenvalue: f64::NAN,
+            budget: COMMAND_BUDGET,
+            spent: 0,
+            depth: 0,
+            problem: None,
+            around: None,
+        };
+        let name: Arc<str> = session.data.source.name.as_str().into();
+        session.texts.insert("datafilename".into(), name);
+        session.make_quadratic();
+        session.current()?;
+        Ok(session)
+    }
+
+    /// Middles for a datafile that says `quadratic` but gives none.
+    fn make_quadratic(&mut self) {
+        let wanted = self.surface.model;
+        if wanted == super::datafile::Model::Quadratic
+            && self.surface.edges.iter().any(|edge| edge.middle.is_none())
+        {
+            self.surface.model = super::datafile::Model::Linear;
+            self.surface.set_model(wanted);
+        }
+    }
+
+    /// Allows this many commands.
+    pub fn set_budget(&mut self, commands: u64) {
+        self.budget = commands;
+    }
+
+    /// The surface.
+    #[must_use]
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// The strength of gravity that acts.
+    fn gravity(&self) -> f64 {
+        if self.gravity { self.variables.get(GRAVITY).unwrap_or(0.0) } else { 0.0 }
+    }
+
+    /// The values of the variables that formulas use.
+    fn inputs(&self) -> Vec<f64> {
+        self.data.formula_inputs(&self.variables)
+    }
+
+    /// The problem of the present surface, made anew where something has changed.
+    fn current(&mut self) -> Result<&mut Current, EvolverError> {
+        let inputs = self.inputs();
+        if self.problem.as_ref().is_some_and(|current| current.inputs != inputs) {
+            self.problem = None;
+        }
+        if self.problem.is_none() {
+            let conditions = Conditions {
+                variables: &self.variables,
+                gravity: self.gravity(),
+                gap: self.gap,
+                quantities: &self.quantities,
+            };
+            let problem = Problem::new(&self.data, &self.surface, &conditions)?;
+            let mut state = State::new(&self.surface);
+            problem.follow_boundaries(&self.surface, &mut state);
+            if let Err(vertex) = problem.settle_all(&mut state, false) {
+                let number = vertex.index() + 1;
+                let message = format!("vertex {number} cannot be brought onto its constraints");
+                return Err(EvolverError::Surface(message));
+            }
+            state.store(&mut self.surface);
+            let values = problem.values(&state.places);
+            self.problem = Some(Current { problem, state, values, inputs });
+        }
+        match &mut self.problem {
+            Some(current) => Ok(current),
+            None => Err(EvolverError::Surface("the surface has no terms".to_owned())),
+        }
+    }
+
+    /// Who borders on whom.
+    fn neighbours(&mut self) -> Arc<Neighbours> {
+        let surface = &self.surface;
+        self.around.get_or_insert_with(|| Arc::new(surface.neighbours())).clone()
+    }
+
+    /// The surface has changed otherwise than by moving.
+    fn changed(&mut self) {
+        self.problem = None;
+        self.around = None;
+        self.descent.restart();
+    }
+
+    /// Energy, area and functionals.
+    ///
+    /// # Errors
+    /// [`EvolverError`] if the surface makes no sense.
+    pub fn values(&mut self) -> Result<Values, EvolverError> {
+        Ok(self.current()?.values.clone())
+    }
+
+    /// All bodies with both of their volumes.
+    ///
+    /// # Errors
+    /// [`EvolverError`] if the surface makes no sense.
+    pub fn bodies(&mut self) -> Result<Vec<BodyReport>, EvolverError> {
+        self.current()?;
+        let Some(current) = &self.problem else { return Ok(Vec::new()) };
+        let closed = closed_volumes(&current.problem, &self.surface, &current.state.places);
+        Ok(self
+            .surface
+            .bodies
+            .enumerated()
+            .map(|(id, body)| BodyReport {
+                id: body.id,
+                target: body.target,
+                volume: current.values.functionals[FunctionalId::from_index(id.index())],
+                closed: closed[id],
+                pressure: self.pressure(id),
+            })
+            .collect())
+    }
+
+    /// Sees that the volumes by integrals are those of the closed bodies.
+    ///
+    /// # Errors
+    /// [`EvolverError::Surface`] with both volumes of a body where they part.
+    fn compare_volumes(&mut self) -> Result<(), EvolverError> {
+        let content = |c: &Option<super::datafile::FormulaVector>| c.is_some();
+        if !self.data.constraints.iter().any(|constraint| content(&constraint.content)) {
+            return Ok(());
+        }
+        for body in self.bodies()? {
+            let Some(closed) = body.closed else { continue };
+            let size = body.target.unwrap_or(body.volume).abs();
+            if (body.volume - closed).abs() > PARTED * size {
+                let message = format!(
+                    "body {}: the content integrals give the volume {}, but the body closed on its walls holds {}. \
+                     The integrand meets its singularity or cut there, or the contact line has left its wall between \
+                     vertices; refine, or choose the integrand's origin away from the body",
+                    body.id,
+                    significant(body.volume, 10),
+                    significant(closed, 10)
+                );
+                return Err(EvolverError::Surface(message));
+            }
+        }
+        Ok(())
+    }
+
+    fn pressure(&self, body: BodyId) -> f64 {
+        let data = &self.surface.bodies[body];
+        if data.prescribed { data.pressure } else { self.multipliers[FunctionalId::from_index(body.index())] }
+    }
+
+    /// All quantities with their values.
+    ///
+    /// # Errors
+    /// [`EvolverError`] if the surface makes no sense.
+    pub fn quantities(&mut self) -> Result<Vec<(String, f64, Purpose)>, EvolverError> {
+        let first = self.surface.bodies.len();
+        let values = self.values()?;
+        Ok(self
+            .data
+            .quantities
+            .iter()
+            .zip(&self.quantities)
+            .enumerate()
+            .map(|(at, (quantity, state))| {
+                (
+                    quantity.name.to_string(),
+                    values.functionals[FunctionalId::from_index(first + at)],
+                    state.purpose,
+                )
+            })
+            .collect())
+    }
+}

@@ -1,0 +1,297 @@
+//! The Voronoi cells of two sheets of seeds, cut off by the walls: cells, films as polygons, corners.
+//!
+//! Each cell is a convex polyhedron, cut from a cube by the half spaces towards its neighbours. What the walls leave of it
+//! is decided corner by corner: corners inside the gap stay, an edge that leaves the gap ends where it meets the wall, and a
+//! film that is cut off ends in an edge on the wall. Corners of neighbouring cells that coincide become one, so that
+//! arrangements of high symmetry, where more than four cells meet, come out right.
+
+use super::NoLayers;
+use crate::foam::partition::polyhedron::{Behind, Face, HalfSpace, Polyhedron};
+use crate::{
+    foam::{
+        convert::as_f64,
+        domain::{Domain, Image},
+        spatial::Bins,
+    },
+    index::checked_u32,
+    surface::{Gap, Period, WallSide},
+};
+use glam::{DVec3, IVec3};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// A corner: an end of borders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corner {
+    /// Where it is.
+    pub place: DVec3,
+    /// The wall that it lies on; none for a corner where four or more cells meet.
+    pub wall: Option<WallSide>,
+}
+
+/// A corner of a film's polygon, seen from the film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct CornerImage {
+    /// Its number.
+    pub corner: usize,
+    /// How many periods away.
+    pub shift: [i32; 3],
+}
+
+/// A film between two cells, before it is meshed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polygon {
+    /// The cell that it is seen from.
+    pub cell: usize,
+    /// The cell behind it.
+    pub neighbour: usize,
+    /// Which image of the neighbour, in periods.
+    pub shift: IVec3,
+    /// Its corners, counter-clockwise seen from the neighbour, in the frame of `cell`.
+    pub corners: Vec<CornerImage>,
+}
+
+/// Cells of two layers and their films.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Division {
+    /// The seeds, those of the lower layer first.
+    pub seeds: Vec<DVec3>,
+    /// How many of them belong to the lower layer.
+    pub lower: usize,
+    /// The lattice.
+    pub period: Period,
+    /// All corners.
+    pub corners: Vec<Corner>,
+    /// All films, each once.
+    pub polygons: Vec<Polygon>,
+}
+
+/// Neighbours are sought within this many spacings of a seed.
+const REACH: f64 = 5.0;
+/// The cube that cells are cut from, in spacings.
+const CUBE: f64 = 4.0;
+/// Corners nearer to each other than this part of the spacing are one.
+const JOINED: f64 = 1e-5;
+
+/// One face of a cell as it is left by the walls.
+struct Cut {
+    neighbour: usize,
+    shift: IVec3,
+    corners: Vec<(DVec3, Option<WallSide>)>,
+}
+
+impl Division {
+    /// Divides the gap between `seeds`, the first `lower` of which belong to the lower layer. `spacing` is about the
+    /// distance of neighbouring seeds.
+    ///
+    /// # Errors
+    /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
+    pub fn new(
+        gap: &Gap,
+        domain: &Domain,
+        seeds: &[DVec3],
+        lower: usize,
+        spacing: f64,
+    ) -> Result<Self, NoLayers> {
+        let seeds: Vec<DVec3> = seeds.iter().map(|&seed| domain.wrap(seed).0).collect();
+        let bins = Bins::new(domain, spacing, &seeds);
+        let cells: Vec<Vec<Cut>> = (0..seeds.len())
+            .into_par_iter()
+            .map(|cell| cut_cell(gap, &bins, &seeds, cell, spacing))
+            .collect::<Result<_, _>>()?;
+        let mut division =
+            Self { seeds, lower, period: domain.period(), corners: Vec::new(), polygons: Vec::new() };
+        let mut joiner = Joiner::new(domain.period(), JOINED * spacing);
+        for (cell, cuts) in cells.into_iter().enumerate() {
+            for cut in cuts {
+                // Each film once: from the cell of lower number, or along the positive period to its own image.
+                let first =
+                    cut.neighbour > cell || (cut.neighbour == cell && cut.shift.to_array() > [0, 0, 0]);
+                let mut corners: Vec<CornerImage> = Vec::with_capacity(cut.corners.len());
+                for (place, wall) in cut.corners {
+                    let image = joiner.image(place, wall);
+                    if corners.last() != Some(&image) && corners.first() != Some(&image) {
+                        corners.push(image);
+                    }
+                }
+                if first && corners.len() > 2 {
+                    let (neighbour, shift) = (cut.neighbour, cut.shift);
+                    division.polygons.push(Polygon { cell, neighbour, shift, corners });
+                }
+            }
+        }
+        division.corners = joiner.corners;
+        division.check(gap)?;
+        Ok(division)
+    }
+
+    /// The place of a corner's image.
+    #[must_use]
+    pub fn place(&self, image: CornerImage) -> DVec3 {
+        self.corners[image.corner].place + self.period.translation(IVec3::from_array(image.shift))
+    }
+
+    /// Whether a cell belongs to the lower layer.
+    #[must_use]
+    pub fn is_lower(&self, cell: usize) -> bool {
+        cell < self.lower
+    }
+
+    /// The edges that a polygon has on a wall: the number of their first corner.
+    pub fn wall_sides<'a>(&'a self, polygon: &'a Polygon) -> impl Iterator<Item = (usize, WallSide)> + 'a {
+        let count = polygon.corners.len();
+        (0..count).filter_map(move |at| {
+            let wall = |at: usize| self.corners[polygon.corners[at % count].corner].wall;
+            let here = wall(at)?;
+            (wall(at + 1) == Some(here)).then_some((at, here))
+        })
+    }
+
+    /// The laws of two layers: every cell has its own wall and only that one, and on each wall cells, edges and corners have
+    /// Euler's number.
+    fn check(&self, gap: &Gap) -> Result<(), NoLayers> {
+        let mut walls = vec![[false; 2]; self.seeds.len()];
+        let mut edges = [0_usize; 2];
+        for polygon in &self.polygons {
+            for (_, wall) in self.wall_sides(polygon) {
+                edges[wall as usize] += 1;
+                walls[polygon.cell][wall as usize] = true;
+                walls[polygon.neighbour][wall as usize] = true;
+            }
+        }
+        let through = walls.iter().enumerate().filter(|(cell, walls)| {
+            let own = usize::from(!self.is_lower(*cell));
+            !walls[own] || walls[1 - own]
+        });
+        let wrong = through.count();
+        if wrong > 0 {
+            return Err(NoLayers::Through { cells: wrong });
+        }
+        let euler = i64::from(gap.middle().euler_characteristic());
+        for side in WallSide::BOTH {
+            let cells = if side == WallSide::Lower { self.lower } else { self.seeds.len() - self.lower };
+            let corners = self.corners.iter().filter(|corner| corner.wall == Some(side)).count();
+            let found = i64::from(checked_u32(corners)) - i64::from(checked_u32(edges[side as usize]))
+                + i64::from(checked_u32(cells));
+            if found != euler {
+                return Err(NoLayers::Euler { found, expected: euler });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn cut_cell(
+    gap: &Gap,
+    bins: &Bins,
+    seeds: &[DVec3],
+    cell: usize,
+    spacing: f64,
+) -> Result<Vec<Cut>, NoLayers> {
+    let seed = seeds[cell];
+    let mut near: Vec<(f64, usize, Image, DVec3)> = Vec::new();
+    bins.for_each_near(seed, REACH * spacing, |other, image, place| {
+        if other != cell || image != Image::IDENTITY {
+            near.push((place.distance_squared(seed), other, image, place - seed));
+        }
+    });
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let mut body = Polyhedron::cube(CUBE * spacing);
+    for (at, &(square, ..)) in near.iter().enumerate() {
+        if square > 4.0 * body.radius_squared() {
+            break;
+        }
+        let way = near[at].3;
+        let half_space = HalfSpace {
+            normal: way.normalize_or_zero(),
+            offset: 0.5 * square.sqrt(),
+            behind: Behind::Cell(checked_u32(at)),
+        };
+        // A cut that only grazes corners takes nothing away.
+        let slack = HalfSpace { offset: half_space.offset + 1e-12 * spacing, ..half_space };
+        body.cut(slack).map_err(|_| NoLayers::Seeds { place: seed })?;
+    }
+    let faces = body.faces.iter().filter_map(|face| {
+        let Behind::Cell(at) = face.half_space.behind else { return None };
+        let (_, neighbour, image, _) = near[at as usize];
+        let corners = within_walls(gap, &body, face, seed);
+        (corners.len() > 2).then(|| Cut { neighbour, shift: image.shift(), corners })
+    });
+    Ok(faces.collect())
+}
+
+/// The part of a face inside the gap: corners that stay, and the places where its edges meet the walls.
+fn within_walls(gap: &Gap, body: &Polyhedron, face: &Face, seed: DVec3) -> Vec<(DVec3, Option<WallSide>)> {
+    let mut kept = Vec::with_capacity(face.corners.len() + 2);
+    let outside = |p: DVec3| match (gap.wall(WallSide::Lower).value(p), gap.wall(WallSide::Upper).value(p)) {
+        (below, _) if below < 0.0 => Some(WallSide::Lower),
+        (_, above) if above > 0.0 => Some(WallSide::Upper),
+        _ => None,
+    };
+    let count = face.corners.len();
+    for at in 0..count {
+        let place = |at: usize| seed + body.corners[face.corners[at % count] as usize];
+        let (from, to) = (place(at), place(at + 1));
+        let (leaves, enters) = (outside(from), outside(to));
+        if leaves.is_none() {
+            kept.push((from, None));
+        }
+        for side in [leaves, enters].into_iter().flatten() {
+            if leaves != enters {
+                let wall = gap.wall(side);
+                kept.push((wall.field.crossing(from, to, wall.level), Some(side)));
+            }
+        }
+    }
+    kept
+}
+
+/// Joins corners that coincide modulo the lattice.
+struct Joiner {
+    period: Period,
+    tolerance: f64,
+    corners: Vec<Corner>,
+    buckets: BTreeMap<[i64; 3], Vec<usize>>,
+}
+
+impl Joiner {
+    fn new(period: Period, tolerance: f64) -> Self {
+        Self { period, tolerance, corners: Vec::new(), buckets: BTreeMap::new() }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "places over the tolerance lie far below 2^63")]
+    fn image(&mut self, place: DVec3, wall: Option<WallSide>) -> CornerImage {
+        let home = self.period.wrap(place, DVec3::ZERO);
+        // Buckets a thousand tolerances wide: near a bucket's border its neighbours are looked at, too.
+        let width = 1000.0 * self.tolerance;
+        let bucket =
+            |p: DVec3| (self.period.wrap(p, DVec3::ZERO) / width).floor().to_array().map(|x| x as i64);
+        for corner in 0..27 {
+            let offset = DVec3::new(
+                f64::from(corner % 3 - 1),
+                f64::from(corner / 3 % 3 - 1),
+                f64::from(corner / 9 - 1),
+            );
+            let Some(found) = self.buckets.get(&bucket(home + self.tolerance * offset)) else { continue };
+            for &candidate in found {
+                let stored = self.corners[candidate].place;
+                let apart = place - stored;
+                if self.period.nearest_image(apart).length() < self.tolerance {
+                    let shift = self.period.nearest_shift(apart).to_array();
+                    return CornerImage { corner: candidate, shift };
+                }
+            }
+        }
+        let corner = self.corners.len();
+        let key = bucket(home);
+        self.corners.push(Corner { place, wall });
+        self.buckets.entry(key).or_default().push(corner);
+        CornerImage { corner, shift: [0; 3] }
+    }
+}
+
+/// The spacing of `count` seeds on `area`, as of a hexagonal lattice.
+#[must_use]
+pub fn spacing(area: f64, count: usize) -> f64 {
+    (area / as_f64(count) * 2.0 / 3.0_f64.sqrt()).sqrt()
+}

@@ -1,0 +1,258 @@
+//! The film complex of a division: each polygon as curved quadrilaterals round its middle.
+//!
+//! A film with `k` corners is cut into `k` quadrilaterals, from each corner to the middles of the two sides that meet there
+//! and to the middle of the film, of `fineness × fineness` biquadratic elements each. Borders are shared by their films;
+//! their nodes are slaved to the two corners, and those inside a film to all nodes round it, by mean value coordinates
+//! (M. S. Floater, "Mean value coordinates", CAGD 20, 2003), so that a film goes with its borders and its wall.
+
+use super::{Division, Polygon, division::CornerImage};
+use crate::foam::{
+    complex::{
+        Complex, Element, Film, Motion, Node, NodeId, NodeImage, Places, Region, RegionId, RegionImage,
+        RegionKind, Shape, WallId,
+    },
+    convert::as_f64,
+};
+use crate::{
+    index::{Id, IndexVec},
+    surface::{Gap, WallSide},
+};
+use glam::{DVec2, DVec3, IVec3};
+use std::collections::BTreeMap;
+
+/// A border or an edge on a wall: its two corners, the second in the frame of the first.
+pub type Side = (usize, usize, [i32; 3]);
+
+/// The films of two layers.
+#[derive(Clone, Debug)]
+pub struct LayerFilms {
+    /// The complex: a region for each cell, a film for each polygon, the corners' nodes first.
+    pub complex: Complex,
+    /// The first places: plane films.
+    pub places: Places,
+    /// The nodes along each border, from its first corner to its second, in the frame of the first; edges on walls are not
+    /// among them.
+    pub borders: BTreeMap<Side, Vec<NodeImage>>,
+}
+
+/// Builds the complex of `division` with `fineness` elements on each half side.
+#[must_use]
+pub fn layer_films(division: &Division, gap: &Gap, fineness: usize) -> LayerFilms {
+    let mut builder = Builder::new(division, gap, fineness);
+    let films = division.polygons.iter().map(|polygon| builder.film(polygon)).collect();
+    let regions = division.seeds.iter().map(|&anchor| Region { kind: RegionKind::Cell, anchor }).collect();
+    let walls: IndexVec<WallId, _> = gap.walls().to_vec().into();
+    let Builder { nodes, places, mut sides, .. } = builder;
+    let complex = Complex { period: division.period, walls, regions, nodes, films };
+    sides.retain(|_, side| !side.is_on_wall);
+    let borders = sides.into_iter().map(|(key, side)| (key, side.nodes)).collect();
+    LayerFilms { complex, places, borders }
+}
+
+struct SideNodes {
+    nodes: Vec<NodeImage>,
+    is_on_wall: bool,
+}
+
+struct Builder<'a> {
+    division: &'a Division,
+    gap: &'a Gap,
+    /// Nodes along a half side, less one.
+    half: usize,
+    nodes: IndexVec<NodeId, Node>,
+    places: Places,
+    sides: BTreeMap<Side, SideNodes>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(division: &'a Division, gap: &'a Gap, fineness: usize) -> Self {
+        let nodes = division
+            .corners
+            .iter()
+            .map(|corner| Node {
+                walls: corner.wall.map(wall_id).into_iter().collect(),
+                motion: Motion::Free,
+            })
+            .collect();
+        let places = division.corners.iter().map(|corner| corner.place).collect();
+        Self { division, gap, half: 2 * fineness, nodes, places, sides: BTreeMap::new() }
+    }
+
+    fn add(&mut self, node: Node, place: DVec3) -> NodeId {
+        self.places.push(place);
+        self.nodes.push(node)
+    }
+
+    /// The nodes along a side of a polygon, both ends included, in the polygon's frame.
+    fn side(&mut self, from: CornerImage, to: CornerImage, wall: Option<WallSide>) -> Vec<NodeImage> {
+        let forward = (from.corner, from.shift) <= (to.corner, to.shift);
+        let (a, b) = if forward { (from, to) } else { (to, from) };
+        let relative = IVec3::from_array(b.shift) - IVec3::from_array(a.shift);
+        let key = (a.corner, b.corner, relative.to_array());
+        if !self.sides.contains_key(&key) {
+            let made = self.new_side(key, relative, wall);
+            self.sides.insert(key, made);
+        }
+        let shift = IVec3::from_array(a.shift);
+        let mut nodes: Vec<NodeImage> = self.sides[&key]
+            .nodes
+            .iter()
+            .map(|image| NodeImage { node: image.node, shift: image.shift + shift })
+            .collect();
+        if !forward {
+            nodes.reverse();
+        }
+        nodes
+    }
+
+    fn new_side(&mut self, key: Side, relative: IVec3, wall: Option<WallSide>) -> SideNodes {
+        let [first, last] = [key.0, key.1].map(NodeId::from_index);
+        let (start, end) =
+            (self.places[first], self.places[last] + self.division.period.translation(relative));
+        let count = 2 * self.half;
+        let mut nodes = vec![NodeImage { node: first, shift: IVec3::ZERO }];
+        for at in 1..count {
+            let part = as_f64(at) / as_f64(count);
+            let masters = vec![(first, 1.0 - part), (last, part)];
+            let straight = start.lerp(end, part);
+            let (node, place) = match wall {
+                None => (Node { walls: Vec::new(), motion: Motion::Border(masters) }, straight),
+                Some(side) => {
+                    let place = self.gap.wall(side).project(straight).unwrap_or(straight);
+                    (Node { walls: vec![wall_id(side)], motion: Motion::Inner(masters) }, place)
+                }
+            };
+            nodes.push(NodeImage { node: self.add(node, place), shift: IVec3::ZERO });
+        }
+        nodes.push(NodeImage { node: last, shift: relative });
+        SideNodes { nodes, is_on_wall: wall.is_some() }
+    }
+
+    fn film(&mut self, polygon: &Polygon) -> Film {
+        let corners = &polygon.corners;
+        let count = corners.len();
+        let on_wall: BTreeMap<usize, WallSide> = self.division.wall_sides(polygon).collect();
+        let sides: Vec<Vec<NodeImage>> = (0..count)
+            .map(|at| self.side(corners[at], corners[(at + 1) % count], on_wall.get(&at).copied()))
+            .collect();
+        let patch = Patch::new(self, &sides);
+        let grid = self.inner_nodes(&sides, &patch);
+        let mut elements = Vec::new();
+        for quad in &grid {
+            for j in (0..self.half).step_by(2) {
+                for i in (0..self.half).step_by(2) {
+                    let nodes = (0..9).map(|at| quad[j + at / 3][i + at % 3]).collect();
+                    elements.push(Element { shape: Shape::Quad9, nodes });
+                }
+            }
+        }
+        let side = |cell: usize, shift| RegionImage { region: RegionId::from_index(cell), shift };
+        Film {
+            front: side(polygon.neighbour, polygon.shift),
+            back: side(polygon.cell, IVec3::ZERO),
+            tension: 1.0,
+            elements,
+        }
+    }
+
+    /// For every corner the grid of nodes of its quadrilateral: `[j][i]`, `i` along the side that follows the corner, `j` back
+    /// along the one before it.
+    fn inner_nodes(&mut self, sides: &[Vec<NodeImage>], patch: &Patch) -> Vec<Vec<Vec<NodeImage>>> {
+        let (count, half) = (sides.len(), self.half);
+        let centre = self.inner(patch, patch.centre);
+        let spokes: Vec<Vec<NodeImage>> = (0..count)
+            .map(|k| {
+                let rim = patch.at(k * 2 * half + half);
+                let inner =
+                    (1..half).map(|t| self.inner(patch, rim.lerp(patch.centre, as_f64(t) / as_f64(half))));
+                let inner: Vec<NodeImage> = inner.collect();
+                std::iter::once(sides[k][half]).chain(inner).chain([centre]).collect()
+            })
+            .collect();
+        (0..count)
+            .map(|k| {
+                let before = (k + count - 1) % count;
+                let corner = patch.at(k * 2 * half);
+                let (next, last) = (patch.at(k * 2 * half + half), patch.at(before * 2 * half + half));
+                let mut rows = Vec::with_capacity(half + 1);
+                for j in 0..=half {
+                    let row = (0..=half).map(|i| match (i, j) {
+                        (i, 0) => sides[k][i],
+                        (0, j) => sides[before][2 * half - j],
+                        (i, j) if i == half => spokes[k][j],
+                        (i, j) if j == half => spokes[before][i],
+                        (i, j) => {
+                            let (u, v) = (as_f64(i) / as_f64(half), as_f64(j) / as_f64(half));
+                            let place = (1.0 - u) * (1.0 - v) * corner
+                                + u * (1.0 - v) * next
+                                + (1.0 - u) * v * last
+                                + u * v * patch.centre;
+                            self.inner(patch, place)
+                        }
+                    });
+                    rows.push(row.collect());
+                }
+                rows
+            })
+            .collect()
+    }
+
+    fn inner(&mut self, patch: &Patch, at: DVec2) -> NodeImage {
+        let weights = patch.weights(at);
+        let place = weights.iter().zip(&patch.places).map(|(&w, &p)| w * p).sum();
+        let masters = patch.nodes.iter().zip(weights).map(|(image, w)| (image.node, w)).collect();
+        let node = self.add(Node { walls: Vec::new(), motion: Motion::Inner(masters) }, place);
+        NodeImage { node, shift: IVec3::ZERO }
+    }
+}
+
+fn wall_id(side: WallSide) -> WallId {
+    WallId::from_index(side as usize)
+}
+
+/// A polygon laid flat: the nodes round it.
+struct Patch {
+    nodes: Vec<NodeImage>,
+    places: Vec<DVec3>,
+    flat: Vec<DVec2>,
+    centre: DVec2,
+}
+
+impl Patch {
+    fn new(builder: &Builder<'_>, sides: &[Vec<NodeImage>]) -> Self {
+        let nodes: Vec<NodeImage> = sides.iter().flat_map(|side| &side[..side.len() - 1]).copied().collect();
+        let place =
+            |image: &NodeImage| builder.places[image.node] + builder.division.period.translation(image.shift);
+        let places: Vec<DVec3> = nodes.iter().map(place).collect();
+        let middle = places.iter().sum::<DVec3>() / as_f64(places.len());
+        let around = places.iter().zip(places.iter().cycle().skip(1));
+        let normal: DVec3 = around.map(|(&a, &b)| (a - middle).cross(b - middle)).sum();
+        let (x, y) = normal.normalize_or(DVec3::Z).any_orthonormal_pair();
+        let flat: Vec<DVec2> =
+            places.iter().map(|&p| DVec2::new((p - middle).dot(x), (p - middle).dot(y))).collect();
+        let corners = flat.iter().step_by(2 * builder.half);
+        let centre = corners.sum::<DVec2>() / as_f64(sides.len());
+        Self { nodes, places, flat, centre }
+    }
+
+    fn at(&self, node: usize) -> DVec2 {
+        self.flat[node % self.flat.len()]
+    }
+
+    /// Mean value coordinates of a point inside.
+    fn weights(&self, at: DVec2) -> Vec<f64> {
+        let count = self.flat.len();
+        let arm = |i: usize| self.flat[i % count] - at;
+        let half_tangents: Vec<f64> = (0..count)
+            .map(|i| {
+                let (a, b) = (arm(i), arm(i + 1));
+                (0.5 * a.perp_dot(b).atan2(a.dot(b))).tan()
+            })
+            .collect();
+        let raw: Vec<f64> = (0..count)
+            .map(|i| (half_tangents[(i + count - 1) % count] + half_tangents[i]) / arm(i).length())
+            .collect();
+        let sum: f64 = raw.iter().sum();
+        raw.into_iter().map(|w| w / sum).collect()
+    }
+}

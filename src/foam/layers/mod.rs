@@ -1,0 +1,100 @@
+//! Foams of two layers: a sheet of cells on each wall, meeting at a middle network, as in the comb of bees.
+//!
+//! **Enters** a [`crate::surface::Gap`] and the number of cells on each wall. **Leaves** a film complex in balance: walls
+//! between cells of one layer, and the films in the middle that close the cells' ends.
+//!
+//! | step | file |
+//! |---|---|
+//! | two sheets of seeds: rhombic, Tóth's, or annealed on both sides | `arrangement.rs` |
+//! | their Voronoi cells, cut off by the walls; corners, polygons | `division.rs` |
+//! | the film complex: each polygon as curved quadrilaterals round its middle | `films.rs` |
+//! | the descent to least energy at equal volumes; films and borders that vanish | `relax.rs` |
+//! | ends with plane films: energies by formula | `ends.rs` |
+//! | side counts, defects, how those of the two layers sit to each other; angles at corners | `figures.rs` |
+//!
+//! Not promised: topology stays as the seeds made it. A border that shrinks to nothing stops the descent, and is reported.
+//!
+//! Sources: L. Fejes Tóth, "What the bees know and what they do not know", Bull. Amer. Math. Soc. 70 (1964); D. Weaire and
+//! R. Phelan, "Optimal design of honeycombs", Nature 367 (1994), who made both arrangements in foam between glass plates.
+
+mod arrangement;
+mod division;
+mod ends;
+mod figures;
+mod films;
+mod relax;
+
+pub use arrangement::{Arrangement, Sheets, sheets};
+pub use division::{Corner, CornerImage, Division, Polygon, spacing};
+pub use ends::{PlaneEnd, plane_end};
+pub use figures::{Companions, LayerFigures, corner_angles, layer_figures, tetrahedral_angle};
+pub use films::{LayerFilms, Side, layer_films};
+pub use relax::{Layers, relaxed};
+
+use crate::foam::{seeds::SeedError, solve::FactorError};
+use glam::DVec3;
+
+/// Why there is no two-layer foam.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoLayers {
+    /// The number of cells does not make rows on the periods.
+    #[error(
+        "{cells} cells a layer make no rows of regular hexagons on the periods {periods:?}: the best, {rows} rows of {columns}, would be stretched by {stretch:.1} %; change the periods or the number of cells"
+    )]
+    Rows {
+        /// Cells asked for.
+        cells: usize,
+        /// The periods.
+        periods: [f64; 2],
+        /// Rows of the best fit.
+        rows: usize,
+        /// Columns of the best fit.
+        columns: usize,
+        /// Its distortion, in per cent.
+        stretch: f64,
+    },
+    /// A pattern of flat comb was asked for on a curved surface.
+    #[error("the {pattern} arrangement is one of plane walls, but the surface is {surface}: use annealed")]
+    Curved {
+        /// The arrangement.
+        pattern: &'static str,
+        /// The surface.
+        surface: &'static str,
+    },
+    /// Seeds coincide.
+    #[error("cells too close to each other at {place}: no polyhedron is left between them")]
+    Seeds {
+        /// Where.
+        place: DVec3,
+    },
+    /// Cells reach from wall to wall, or miss their own.
+    #[error(
+        "{cells} cells reach the other wall or miss their own: the layers do not fit the height of the gap; widen it or ask for more cells"
+    )]
+    Through {
+        /// How many.
+        cells: usize,
+    },
+    /// The cells on a wall do not cover it once.
+    #[error(
+        "the cells on a wall have Euler's number {found}, the wall has {expected}: too few cells for this gap"
+    )]
+    Euler {
+        /// Of the cells.
+        found: i64,
+        /// Of the wall.
+        expected: i64,
+    },
+    /// No seeds.
+    #[error(transparent)]
+    Sown(#[from] SeedError),
+    /// The seeds left the gap.
+    #[error("no point of a layer's middle is found from the seed {place}")]
+    Lost {
+        /// From where.
+        place: DVec3,
+    },
+    /// The system could not be solved.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+}

@@ -1,0 +1,368 @@
+//! Surface Evolver datafiles: the language, its errors, and runs held against laws and against Surface Evolver's own numbers.
+
+use combwright::evolver::{
+    Document, EvolverError, parse_commands,
+    session::{Flow, Host, Session},
+    source::Source,
+    surface::Fault,
+};
+use proptest::prelude::*;
+use std::{collections::BTreeMap, fmt::Write as _, path::Path};
+
+/// Collects what commands print and write.
+#[derive(Default)]
+struct Paper {
+    text: String,
+    files: BTreeMap<String, String>,
+}
+
+impl Host for Paper {
+    fn print(&mut self, text: &str) {
+        self.text.push_str(text);
+    }
+
+    fn write(&mut self, name: &str, text: &str, append: bool) -> Result<(), std::io::Error> {
+        let file = self.files.entry(name.to_owned()).or_default();
+        if !append {
+            file.clear();
+        }
+        file.push_str(text);
+        Ok(())
+    }
+
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// Reads a datafile, runs its read section and then the commands.
+fn run(text: &str, commands: &str) -> Result<(Session, Paper), EvolverError> {
+    let source = Source::new("test.fe", text);
+    let mut document = Document::new(&source)?;
+    let read_section = std::mem::take(&mut document.commands);
+    let mut session = Session::new(document)?;
+    let mut paper = Paper::default();
+    session.run(&source, &read_section, &mut paper)?;
+    let source = Source::new("commands", commands);
+    let flow = session.run(&source, &parse_commands(&source)?, &mut paper)?;
+    assert!(matches!(flow, Flow::Next | Flow::Quit));
+    Ok((session, paper))
+}
+
+fn energy(text: &str, commands: &str) -> f64 {
+    match run(text, commands) {
+        Ok((mut session, _)) => session.values().unwrap().energy,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+const CUBE: &str = "
+vertices
+1  0.0 0.0 0.0
+2  1.0 0.0 0.0
+3  1.0 1.0 0.0
+4  0.0 1.0 0.0
+5  0.0 0.0 1.0
+6  1.0 0.0 1.0
+7  1.0 1.0 1.0
+8  0.0 1.0 1.0
+edges
+1   1 2
+2   2 3
+3   3 4
+4   4 1
+5   5 6
+6   6 7
+7   7 8
+8   8 5
+9   1 5
+10  2 6
+11  3 7
+12  4 8
+faces
+1   1 10 -5  -9
+2   2 11 -6 -10
+3   3 12 -7 -11
+4   4  9 -8 -12
+5   5  6  7   8
+6  -4 -3 -2  -1
+bodies
+1   1 2 3 4 5 6  volume 1
+";
+
+#[test]
+fn a_cube_has_its_area_and_volume() {
+    let (mut session, _) = run(CUBE, "").unwrap();
+    assert!((session.values().unwrap().energy - 6.0).abs() < 1e-14);
+    let body = &session.bodies().unwrap()[0];
+    assert!((body.volume - 1.0).abs() < 1e-14 && (body.closed.unwrap() - 1.0).abs() < 1e-14, "{body:?}");
+}
+
+#[test]
+fn gradient_steps_on_the_cube_go_as_surface_evolver_s() {
+    // Surface Evolver 2.70 on the same file after `g 5`, `r; g 5` and `hessian`.
+    for (commands, reference) in [
+        ("g 5", 5.112_493_127_727_40),
+        ("g 5; r; g 5", 4.907_490_278_268_99),
+        ("g 5; r; g 5; hessian", 4.907_365_201_927_28),
+    ] {
+        let here = energy(CUBE, commands);
+        assert!((here / reference - 1.0).abs() < 1e-9, "{commands}: {here} {reference}");
+    }
+}
+
+#[test]
+fn a_quadratic_bubble_comes_close_to_the_sphere() {
+    // The sphere of volume 1: (36π)^(1/3).
+    let sphere = (36.0 * std::f64::consts::PI).cbrt();
+    let mut last = f64::INFINITY;
+    for levels in 1..=3 {
+        let commands =
+            format!("g 5; {} M 2; hessian; hessian; hessian; hessian", "r; g 5; hessian; ".repeat(levels));
+        let excess = energy(CUBE, &commands) / sphere - 1.0;
+        assert!(excess.abs() < 0.2 * last, "level {levels}: {excess:e}");
+        last = excess.abs();
+    }
+    assert!(last < 2e-5, "{last:e}");
+}
+
+#[test]
+fn what_is_written_reads_back_with_the_same_energy() {
+    let (mut session, paper) = run(CUBE, "r; g 10; dump \"a.fe\"").unwrap();
+    let again = energy(&paper.files["a.fe"], "");
+    let here = session.values().unwrap().energy;
+    assert!((again / here - 1.0).abs() < 1e-14, "{again} {here}");
+}
+
+#[test]
+fn syntax_errors_tell_line_column_and_what_was_expected() {
+    for (text, line, column, words) in [
+        ("vertices\n1 0 0\n", 2, 1, "coordinates"),
+        ("vertices\n1 0 0 ) 0\n", 2, 7, "expected an expression"),
+        ("parameter a 3\n", 1, 13, "expected «=»"),
+        ("vertices\n1 0 0 0\nedges\n1 1 2\n", 4, 1, "vertex 2, which does not exist"),
+        ("vertices\n1 0 0 0 glued\n", 2, 9, "is not defined"),
+        ("metric\n1 0\n", 1, 1, "not supported: METRIC"),
+        ("constraint 1\nformula: x^2 + q = 1\n", 2, 16, "«q» is not defined"),
+        ("vertices\n1 0 0 0 constraint 4\n", 2, 20, "no constraint 4"),
+    ] {
+        let error = Document::new(&Source::new("bad.fe", text)).unwrap_err().to_string();
+        let place = format!("line {line}, column {column}");
+        assert!(error.contains(&place) && error.contains(words), "{text:?}: {error}");
+        let shown = text.lines().nth(line - 1).unwrap();
+        assert!(error.contains(shown), "the line itself is missing: {error}");
+    }
+}
+
+#[test]
+fn a_face_that_points_the_wrong_way_is_named() {
+    let text = CUBE.replace("1   1 2 3 4 5 6  volume 1", "1   1 2 -3 4 5 6  volume 1");
+    let mut document = Document::new(&Source::new("cube.fe", text)).unwrap();
+    let [Fault::Misoriented { body: 1, faces, .. }] = &document.faults[..] else {
+        panic!("{:?}", document.faults)
+    };
+    assert_eq!(faces, &[3]);
+    assert_eq!(document.turn_faces().unwrap(), [(1, 3)]);
+    assert!(document.faults.is_empty());
+}
+
+#[test]
+fn the_control_language_computes() {
+    let commands = "
+        total := 0;
+        for ( n := 1 ; n <= 10 ; n += 1 ) { if n mod 2 == 0 then total += n else { continue } };
+        half := { total := total / 2 };
+        half;
+        while total > 16 do { total -= 1; if total == 12 then break };
+        do { total *= 2 } while total < 30;
+        printf \"%g %d %s\\n\", total, count(edge where length > 0.5, 1), \"done\";
+        print max(vertex, x) + sum(facet, area);
+        foreach edge ee where ee.vertex[1].x == 0 and ee.z == 1 do { set ee.vertex[2] z 1 }
+    ";
+    let source = Source::new("c", commands);
+    assert!(parse_commands(&source).is_err(), "set with a named element is not part of the language");
+    let commands = commands.replace("do { set ee.vertex[2] z 1 }", "do { printf \"edge %d\\n\", ee.id }");
+    let (_, paper) = run(CUBE, &commands).unwrap();
+    // 2+4+6+8+10 = 30, halved 15, doubled once: 30. The cube has 12 sides of length 1 and 24 spokes of √½.
+    assert!(paper.text.starts_with("30 36 done\n7\n"), "{}", paper.text);
+    assert_eq!(paper.text.matches("edge ").count(), 2, "{}", paper.text);
+}
+
+#[test]
+fn a_loop_without_end_is_stopped() {
+    let source = Source::new("cube.fe", CUBE);
+    let mut session = Session::new(Document::new(&source).unwrap()).unwrap();
+    session.set_budget(1000);
+    let commands = Source::new("c", "n := 0; while 1 do n += 1");
+    let ended = session.run(&commands, &parse_commands(&commands).unwrap(), &mut Paper::default());
+    assert!(matches!(ended, Err(EvolverError::Budget(1000))));
+}
+
+/// A bubble on a plane that is tilted away from the origin: its content is that of the closed body.
+#[test]
+fn a_drop_on_a_wall_reaches_the_half_sphere() {
+    let mound = CUBE
+        .replace("vertices", "constraint 1\nformula: z = 0\nvertices")
+        .replace("0.0\n5", "0.0 constraint 1\n5")
+        .replace("1  0.0 0.0 0.0\n", "1  0.0 0.0 0.0 constraint 1\n")
+        .replace("2  1.0 0.0 0.0\n", "2  1.0 0.0 0.0 constraint 1\n")
+        .replace("3  1.0 1.0 0.0\n", "3  1.0 1.0 0.0 constraint 1\n")
+        .replace("1   1 2\n", "1   1 2 constraint 1\n")
+        .replace("2   2 3\n", "2   2 3 constraint 1\n")
+        .replace("3   3 4\n", "3   3 4 constraint 1\n")
+        .replace("4   4 1\n", "4   4 1 constraint 1\n")
+        .replace("6  -4 -3 -2  -1\n", "")
+        .replace("1   1 2 3 4 5 6  volume 1", "1   1 2 3 4 5  volume 1");
+    let (mut session, _) =
+        run(&mound, "g 5; r; g 10; hessian; r; g 10; hessian; M 2; hessian; hessian; hessian").unwrap();
+    // Half a sphere of volume 1: 2π r² with 2π r³/3 = 1.
+    let exact = (18.0 * std::f64::consts::PI).cbrt();
+    let here = session.values().unwrap().energy;
+    assert!((here / exact - 1.0).abs() < 1e-4, "{here} {exact}");
+    let body = &session.bodies().unwrap()[0];
+    // The quadratic contact line is planar: both volumes are the same integral.
+    assert!((body.volume - body.closed.unwrap()).abs() < 1e-9, "{body:?}");
+}
+
+#[test]
+fn the_paper_s_sphere_agrees_with_surface_evolver() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/fe/Sphere.fe");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        eprintln!("skipped: {} is not here", path.display());
+        return;
+    };
+    // Surface Evolver 2.70 with the same commands.
+    let after = energy(&text, "g 5");
+    assert!((after / 1.954_099_560_156_06 - 1.0).abs() < 1e-9, "{after}");
+    let first = "u; V; V; V; g 30; hessian; hessian; hessian; hessian;";
+    let least = energy(&text, first);
+    assert!((least / 1.954_076_184_247_46 - 1.0).abs() < 1e-9, "{least}");
+    let second = "r; u; V; V; V; g 30; hessian_seek; hessian_seek; hessian_seek; hessian; hessian";
+    let least = energy(&text, &format!("{first} {second}"));
+    assert!((least / 1.798_678_032_833_14 - 1.0).abs() < 1e-9, "{least}");
+}
+
+/// Words of the language, thrown together.
+fn words() -> impl Strategy<Value = String> {
+    let word = prop::sample::select(vec![
+        "vertices",
+        "edges",
+        "faces",
+        "bodies",
+        "read",
+        "constraint",
+        "formula:",
+        "parameter",
+        "x",
+        "y^2",
+        "1",
+        "-3",
+        "2.5e3",
+        "(",
+        ")",
+        "{",
+        "}",
+        "[",
+        "]",
+        ":=",
+        "+=",
+        ";",
+        ",",
+        ":",
+        "?",
+        "*",
+        "/",
+        "^",
+        "where",
+        "foreach",
+        "do",
+        "if",
+        "then",
+        "else",
+        "while",
+        "sum(",
+        "edge",
+        "vertex[1]",
+        ".",
+        "\"%d\"",
+        "printf",
+        "g 1",
+        "r",
+        "hessian",
+        "#define A A",
+        "#define B 1+1",
+        "A",
+        "B",
+        "\n",
+        "\\\n",
+        "//",
+        "/*",
+        "*/",
+        "quantity",
+        "method",
+        "fixed",
+        "boundary",
+        "torus",
+        "e1:",
+        "function real f(real a) { return f(a); }",
+        "f(2)",
+        "sin(",
+        "atan2(y,x)",
+        "on_constraint 1",
+        "not",
+        "and",
+    ]);
+    prop::collection::vec(word, 0..60).prop_map(|words| {
+        words.into_iter().fold(String::new(), |mut text, word| {
+            let _ = write!(text, "{word} ");
+            text
+        })
+    })
+}
+
+fn try_all(text: &str) {
+    let source = Source::new("fuzz", text);
+    if let Ok(document) = Document::new(&source)
+        && let Ok(mut session) = Session::new(document)
+    {
+        session.set_budget(200);
+        let _ = session.run(&source, &[], &mut Paper::default());
+    }
+    if let Ok(statements) = parse_commands(&source) {
+        let cube = Source::new("cube", CUBE);
+        let mut session = Session::new(Document::new(&cube).unwrap()).unwrap();
+        session.set_budget(30);
+        let _ = session.run(&source, &statements, &mut Paper::default());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        try_all(&String::from_utf8_lossy(&bytes));
+    }
+
+    #[test]
+    fn no_words_make_the_reader_or_a_session_panic(text in words()) {
+        try_all(&text);
+        try_all(&format!("{CUBE}\nread\n{text}"));
+    }
+}
+
+#[test]
+fn deep_and_long_texts_are_refused_and_not_fatal() {
+    for text in [
+        "(".repeat(100_000),
+        format!("x := {}1", "-".repeat(100_000)),
+        format!("x := 1{}", "+1".repeat(100_000)),
+        "{".repeat(100_000),
+        format!("x := {}", "a.".repeat(100_000)),
+        format!("x := {}", "1?".repeat(100_000)),
+        format!("x := {}", "2^".repeat(100_000)),
+        format!("#define A {}\nA", "A ".repeat(100)),
+    ] {
+        try_all(&text);
+    }
+}
