@@ -217,6 +217,7 @@ impl<'a> Demo<'a> {
             runs: 1,
             jobs: None,
             output: PathBuf::new(),
+            write_fe: None,
         }
     }
 
