@@ -218,6 +218,7 @@ impl<'a> Demo<'a> {
             jobs: None,
             write_fe: None,
             output: PathBuf::new(),
+            write_fe: None,
         }
     }
 

@@ -22,7 +22,8 @@
 //! Not promised: a relaxed foam is a local minimum; other seeds may lie lower. Energies are those of the mesh: their error
 //! falls with the fourth power of the number of elements along a film and is 1e-5 with the default on a foam of 64 cells.
 //! Networks have three cells at every vertex, so that a sphere needs four cells or more. Relaxation knows periodic and closed
-//! surfaces only, not plane walls across the gap. Seeds without any annealing or polish settle in most runs, not in all.
+//! surfaces only, not plane walls across the gap; where level-set walls lie as far apart as Φ = ±0.86 on the P-surface it stalls.
+//! Seeds without annealing or polish settle too, but in a hundred steps where films crumple on the way.
 //!
 //! Sources: K. A. Brakke, "The Surface Evolver", Experimental Mathematics 1 (1992), for films as minimised energies;
 //! J. Nocedal and S. Wright, "Numerical Optimization" (2006), for Newton steps under constraints and inertia.

@@ -163,7 +163,8 @@ fn the_reference_foam_between_plates_has_the_energy_of_its_two_dimensional_limit
     let relaxed = relax(network, &gap, &meshed(4, 1), &mut |_| ControlFlow::Continue(())).unwrap();
     assert!(matches!(relaxed.stop, Stop::Converged { .. }), "{:?}", relaxed.stop);
     let energy = energy_of(&relaxed.state, &gap);
-    assert!((energy / 61.529_026_5 - 1.0).abs() < 1e-7, "{energy}");
+    // Meshes of two and of four elements agree, 2.7e-7 below the reference, whose sides are one parabola each.
+    assert!((energy / 61.529_026_5 - 1.0).abs() < 4e-7, "{energy}");
 }
 
 #[test]
