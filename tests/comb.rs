@@ -13,11 +13,10 @@ use std::{collections::HashMap, error::Error, fs, path::Path};
 
 type TestResult = Result<(), Box<dyn Error>>;
 
-/// About 400 cells, of 900 x 700 px at most.
 fn settings(pitch: u32, difficulty: f64, style: Style) -> RenderSettings {
     RenderSettings {
-        width: (pitch * 45 / 2).min(900),
-        height: (pitch * 35 / 2).min(700),
+        width: 900,
+        height: 700,
         pitch: f64::from(pitch),
         style,
         difficulty: Difficulty::dial(difficulty),

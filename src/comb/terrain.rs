@@ -48,9 +48,9 @@ pub(crate) fn levels(relief: &Plane, tile: &Tile, pitch: f64) -> Vec<u16> {
         let mut x = 0;
         while x < width {
             let end = down[x..].iter().position(|d| *d == 0).map_or(width, |run| x + run);
-            for place in x..end {
+            for (place, v) in (x..end).zip(&mut out[x..end]) {
                 let squared = nearest(down, x..end, place, farthest);
-                out[place] = level(WALL_LEVEL + slope * narrow(f64::from(squared).sqrt()));
+                *v = level(WALL_LEVEL + slope * narrow(f64::from(squared).sqrt()));
             }
             x = end + 1;
         }
@@ -65,8 +65,10 @@ fn nearest(down: &[u16], run: Range<usize>, place: usize, farthest: usize) -> u3
     let to_right = if run.end < down.len() { run.end - place } else { farthest };
     let reach = to_left.min(to_right).min(farthest);
     let mut least = square(reach);
-    for other in (place + 1).saturating_sub(reach).max(run.start)..(place + reach).min(run.end) {
-        least = least.min(square(usize::from(down[other])) + square(place.abs_diff(other)));
+    let first = (place + 1).saturating_sub(reach).max(run.start);
+    let last = (place + reach).min(run.end);
+    for (other, distance) in (first..last).zip(&down[first..last]) {
+        least = least.min(square(usize::from(*distance)) + square(place.abs_diff(other)));
     }
     least
 }
