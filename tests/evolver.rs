@@ -1,5 +1,7 @@
 //! Surface Evolver datafiles: the language, its errors, and runs held against laws and against Surface Evolver's own numbers.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail by a panic, too")]
+
 use combwright::evolver::{
     Document, EvolverError, parse_commands,
     session::{Flow, Host, Session},

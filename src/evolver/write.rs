@@ -32,6 +32,9 @@ pub enum WriteError {
 /// A point of the datafile: a node of the foam, or the middle of a wall patch.
 type Vertex = usize;
 
+/// A piece of an outline between two wrapped vertices.
+type Piece = [(Vertex, IVec3); 2];
+
 /// The digits that bring a number back as it was.
 const DIGITS: usize = 17;
 
@@ -235,7 +238,7 @@ impl Writer<'_> {
     fn patches(&mut self) -> Result<(), WriteError> {
         let complex = self.complex;
         // The outline of each cell on each wall, in the cell's frame, running as the patch's own outline does.
-        let mut outlines: BTreeMap<(RegionId, WallId), Vec<[(Vertex, IVec3); 2]>> = BTreeMap::new();
+        let mut outlines: BTreeMap<(RegionId, WallId), Vec<Piece>> = BTreeMap::new();
         for film in &complex.films {
             for (side, turned) in [(film.back, false), (film.front, true)] {
                 if complex.regions[side.region].kind != RegionKind::Cell {

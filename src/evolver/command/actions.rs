@@ -165,7 +165,7 @@ pub(super) fn action(cursor: &mut Cursor, word: &str) -> Parsed {
     if let Some((_, hint)) = REFUSED.iter().find(|(name, _)| *name == word) {
         cursor.bump();
         skip_statement(cursor);
-        return Ok(Action::Refused(word.into(), *hint));
+        return Ok(Action::Refused(word.into(), hint));
     }
     cursor.bump();
     if let Some(parsed) = element_command(cursor, word) {

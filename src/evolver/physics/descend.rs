@@ -201,6 +201,9 @@ impl Restoring {
     }
 }
 
+/// The force on each vertex, and the multiplier of each functional.
+type Forces = (IndexVec<VertexId, DVec3>, IndexVec<FunctionalId, f64>);
+
 /// Up to this many functionals products are summed in a full matrix, which is faster to fill.
 const DENSE: usize = 64;
 
@@ -218,7 +221,7 @@ impl Problem {
         state: &State,
         gradients: &Gradients,
         restoring: &Restoring,
-    ) -> Result<(IndexVec<VertexId, DVec3>, IndexVec<FunctionalId, f64>), EvolverError> {
+    ) -> Result<Forces, EvolverError> {
         let mut force: IndexVec<VertexId, DVec3> =
             self.holds.ids().map(|vertex| self.projected(state, vertex, -gradients.energy[vertex])).collect();
         let mut load = vec![0.0; restoring.held.len()];
@@ -233,7 +236,7 @@ impl Problem {
         for vertex in self.holds.ids() {
             for (id, velocity) in restoring.velocities.at(vertex) {
                 if let Some(row) = restoring.row[id] {
-                    force[vertex] = force[vertex] - factors[row as usize] * velocity;
+                    force[vertex] -= factors[row as usize] * velocity;
                 }
             }
         }

@@ -373,7 +373,7 @@ fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId
                 Some(edge) => neighbours.facets[*edge].iter().map(|&(facet, _)| facet).collect(),
                 None => neighbours.facets_at(id),
             };
-            let Some(&first) = facets.first() else { return None };
+            let &first = facets.first()?;
             // Neighbouring facets may be turned round: all are counted to the side of the first.
             let start = areas[first];
             let sum: DVec3 = facets

@@ -127,7 +127,7 @@ impl Newton {
         for local in problem.locals(&state.places, &weights) {
             for (i, &a) in local.nodes[..local.count].iter().enumerate() {
                 let a = VertexId::from_index(a as usize);
-                forces[a] = forces[a] + local.gradient[i];
+                forces[a] += local.gradient[i];
                 for j in 0..local.count {
                     self.scatter(&local, i, j);
                 }

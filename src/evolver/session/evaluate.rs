@@ -396,7 +396,7 @@ impl Session {
 
 /// A whole number that is not negative.
 pub(super) fn whole(number: f64) -> Option<usize> {
-    let fits = number >= 0.0 && number < 4e9 && is_zero(number.fract());
+    let fits = (0.0..4e9).contains(&number) && is_zero(number.fract());
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
     let whole = fits.then_some(number as usize);
     whole

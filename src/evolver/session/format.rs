@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(significant(0.0001, 6), "0.0001");
         let numbers = |values: &[f64]| values.iter().map(|v| Argument::Number(*v)).collect::<Vec<_>>();
         assert_eq!(
-            printf("%5.2f|%-6d|%06d", &numbers(&[3.14159, 42.0, 7.0])),
+            printf("%5.2f|%-6d|%06d", &numbers(&[3.14259, 42.0, 7.0])),
             Ok(" 3.14|42    |000007".to_owned())
         );
         assert_eq!(printf("%.3e %g%%", &numbers(&[12345.678, 0.5])), Ok("1.235e+04 0.5%".to_owned()));
