@@ -94,7 +94,7 @@ pub(super) fn map_all(
         let size = photo_size(path)?;
         let (camera, error_px) = match arguments.marks.get(index) {
             Some(marks) => from_marks(marks, size, arguments.focal)?,
-            None => (wall.from_above(arguments.mm_per_px, size)?, None),
+            None => (wall.seen_from_above(arguments.mm_per_px, size)?, None),
         };
         let found = map_pattern(&sample.pattern, &wall.moved(&camera), &wall.caster, "mm")
             .with_context(|| path.display().to_string())
@@ -141,7 +141,7 @@ impl OnWall {
         Camera { centre: camera.centre + self.moved, ..*camera }
     }
 
-    fn from_above(&self, mm_per_px: Option<f64>, size: DVec2) -> Result<Camera, CliError> {
+    fn seen_from_above(&self, mm_per_px: Option<f64>, size: DVec2) -> Result<Camera, CliError> {
         let scale = mm_per_px.filter(|scale| *scale > 0.0 && scale.is_finite()).ok_or_else(|| {
             CliError::mistake(anyhow!("--mm-per-px must be a positive number, as in --mm-per-px 0.06"))
         })?;

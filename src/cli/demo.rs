@@ -218,7 +218,6 @@ impl<'a> Demo<'a> {
             jobs: None,
             write_fe: None,
             output: PathBuf::new(),
-            write_fe: None,
         }
     }
 

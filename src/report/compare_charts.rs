@@ -196,12 +196,15 @@ fn groups(comparison: &Comparison) -> [&Group; 2] {
     [&comparison.comb, &comparison.foam]
 }
 
+/// Places of a chart, in the axes' units.
+type Line = Vec<(f64, f64)>;
+
 /// Aboav–Weaire: n·m(n) against n, with the fitted law of each group's first pattern.
 ///
 /// # Errors
 /// [`ChartError`] if the chart cannot be drawn.
 pub fn aboav_weaire(comparison: &Comparison) -> Result<Figure, ChartError> {
-    let of = |group: &Group| -> (Vec<(f64, f64)>, Option<Vec<(f64, f64)>>) {
+    let of = |group: &Group| -> (Line, Option<Line>) {
         let mut places = Vec::new();
         let mut line = None;
         for pattern in &group.patterns {
