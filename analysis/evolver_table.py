@@ -85,12 +85,12 @@ def timed(command, **options):
 
 def figures(text):
     """The last energy and the bodies' volumes and pressures; or what went wrong."""
-    energies = re.findall(r"RESULT (\S+)", text)
+    energies = re.findall(r"RESULT (-?\d\S*)", text)
     if not energies:
         found = re.search(r"(?:error: )?(not supported: [^\n]*)|error: ([^\n]*)", text)
         reason = (found.group(1) or found.group(2)) if found else "no result"
         return None, [], reason
-    bodies = re.findall(r"BODY (\d+) (\S+) (\S+)", text)
+    bodies = re.findall(r"BODY (\d+) (-?\d\S*) (-?\d\S*)", text)
     return float(energies[-1]), bodies, ""
 
 
@@ -126,8 +126,9 @@ def main():
     for file, commands in cases:
         if not file.exists() or (arguments.only and arguments.only not in file.name):
             continue
-        theirs, _, why_theirs = (lambda t: figures(t[0]) if t else None)(result := run_evolver(arguments.evolver, file, commands))
-        ours, _, why_ours = figures((answer := run_combwright(arguments.combwright, file, commands, file.name == "Psurface.fe"))[0])
+        result = run_evolver(arguments.evolver, file, commands)
+        answer = run_combwright(arguments.combwright, file, commands, file.name == "Psurface.fe")
+        (theirs, _, why_theirs), (ours, _, why_ours) = figures(result[0]), figures(answer[0])
         difference = f"{abs(ours / theirs - 1):.1e}" if ours is not None and theirs else "-"
         shown = [f"{value:.12g}" if value is not None else why for value, why in ((theirs, why_theirs), (ours, why_ours))]
         print(row.format(file.name, *shown, difference, f"{result[1]:.2f}", f"{answer[1]:.2f}"), flush=True)

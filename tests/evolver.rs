@@ -102,11 +102,12 @@ fn a_cube_has_its_area_and_volume() {
 
 #[test]
 fn gradient_steps_on_the_cube_go_as_surface_evolver_s() {
-    // Surface Evolver 2.70 on the same file after `g 5`, `r; g 5` and `hessian`.
+    // Surface Evolver 2.70 on the same file with the same commands. After more steps at one level the scale that it goes on
+    // with is made of rounding.
     for (commands, reference) in [
         ("g 5", 5.112_493_127_727_40),
-        ("g 5; r; g 5", 4.907_490_278_268_99),
-        ("g 5; r; g 5; hessian", 4.907_365_201_927_28),
+        ("g 3; r; g 5", 4.907_497_213_367_54),
+        ("g 3; r; g 5; hessian", 4.907_351_104_559_55),
     ] {
         let here = energy(CUBE, commands);
         assert!((here / reference - 1.0).abs() < 1e-9, "{commands}: {here} {reference}");

@@ -62,7 +62,7 @@ const TOGGLES: [&str; 46] = [
 ];
 
 /// Commands of the display: there is none here.
-const DISPLAY: [&str; 11] = [
+const DISPLAY: [&str; 12] = [
     "show",
     "showq",
     "show_off",
@@ -71,6 +71,7 @@ const DISPLAY: [&str; 11] = [
     "zoom",
     "view_matrix",
     "transform_expr",
+    "transforms",
     "binary_off",
     "ps_colorflag",
     "geompipe",

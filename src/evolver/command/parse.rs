@@ -218,7 +218,9 @@ fn starts_command(cursor: &Cursor) -> bool {
         TokenKind::Word(word) => ElementKind::named(&word.to_lowercase()),
         _ => None,
     };
-    kind.is_some() && cursor.word().is_some_and(|word| known.contains(&word.as_str()))
+    let Some(word) = cursor.word() else { return false };
+    let display = ["transform_expr", "transforms"].contains(&word.as_str());
+    display || (kind.is_some() && known.contains(&word.as_str()))
 }
 
 /// An assignment, if one begins here.

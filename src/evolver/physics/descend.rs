@@ -52,6 +52,8 @@ pub(crate) struct Descended {
     pub(crate) multipliers: IndexVec<FunctionalId, f64>,
     /// Whether nothing lowered the energy.
     pub(crate) stuck: bool,
+    /// The energy without a step, the functionals restored.
+    pub(crate) base: f64,
 }
 
 /// The sum of the functionals' errors at which restoring stops: Surface Evolver's, absolute as there.
@@ -266,12 +268,12 @@ impl Problem {
         let (force, multipliers) = self.force(state, &gradients, &restoring)?;
         let direction = descent.direction(force);
         let trial = Trial { problem: self, state, direction: &direction, restoring: &restoring };
-        let (mut scale, mut stuck) = (descent.scale, false);
+        let (mut scale, mut stuck, mut base) = (descent.scale, false, f64::INFINITY);
         let (moved, values) = if descent.fixed {
             trial.at(scale, true)?
         } else {
             let found = trial.optimum(descent)?;
-            (scale, stuck) = (found.scale, found.stuck);
+            (scale, stuck, base) = (found.scale, found.stuck, found.energy);
             let best = trial.at(scale, true)?;
             if best.1.energy > found.energy {
                 // The parabola missed: the scale that is known to lower the energy.
@@ -287,7 +289,7 @@ impl Problem {
         }
         *state = moved;
         descent.scale = scale;
-        Ok((Descended { values, scale, multipliers, stuck }, gradients.functionals))
+        Ok((Descended { values, scale, multipliers, stuck, base }, gradients.functionals))
     }
 }
 

@@ -206,13 +206,12 @@ impl Session {
             self.current()?;
             let Some(current) = &mut self.problem else { return Ok(()) };
             let old = current.state.clone();
-            let before = current.values.clone();
             let pattern = slots.take().unwrap_or_else(|| current.problem.slots());
             let (done, pattern) = current.problem.descend(&mut current.state, &mut self.descent, pattern)?;
             slots = Some(pattern);
             self.multipliers = done.multipliers.clone();
             let folded = folded_facets(&self.surface, &old, &current.state);
-            if folded > 0 && done.values.energy > before.energy {
+            if folded > 0 && done.values.energy > done.base {
                 current.state = old;
                 self.say(host, "The step would turn facets over and raise the energy: undone.\n");
                 return Ok(());
