@@ -4,6 +4,8 @@
 //! `cargo bench --bench compare -- FOLDER` prints both as tables and draws the power into FOLDER as `compare_power.svg`
 //! and `.png`. It takes about a minute on two cores.
 
+#![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
+
 use combwright::{
     compare::{LEVEL, Sample, Settings, compare},
     report::{compare_charts::power_chart, folder::OutputFolder},
@@ -89,17 +91,15 @@ fn three_classes(one: &CellPattern, two: &CellPattern) -> f64 {
     });
     let totals = counts.map(|c| c.iter().sum::<f64>());
     let all = totals[0] + totals[1];
-    let mut distance = 0.0;
-    for class in 0..3 {
+    let of_class = |class: usize| {
         let pooled = (counts[0][class] + counts[1][class]) / all;
-        for group in 0..2 {
-            if pooled > 0.0 {
-                distance +=
-                    (counts[group][class] - totals[group] * pooled).powi(2) / (totals[group] * pooled);
-            }
-        }
-    }
-    distance
+        let of_group = |(count, total): (&[f64; 3], &f64)| {
+            let expected = total * pooled;
+            if expected > 0.0 { (count[class] - expected).powi(2) / expected } else { 0.0 }
+        };
+        counts.iter().zip(&totals).map(of_group).sum::<f64>()
+    };
+    (0..3).map(of_class).sum()
 }
 
 /// Every cell has its sides for itself.

@@ -56,13 +56,11 @@ const PROBE: &str = r#"<script>
 })();
 </script></body>"#;
 
-/// The demo, made once with few cells, and a second time with another number of threads.
+/// The demo, made once, and a second time with another number of threads.
 fn demo(home: &Path, name: &str, jobs: &str) -> Tried<PathBuf> {
     let out = home.join(name);
-    let run = Command::new(env!("CARGO_BIN_EXE_combwright"))
-        .args(["demo", "-n", "128", "-j", jobs, "-o"])
-        .arg(&out)
-        .output()?;
+    let run =
+        Command::new(env!("CARGO_BIN_EXE_combwright")).args(["demo", "-j", jobs, "-o"]).arg(&out).output()?;
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     Ok(out)
 }

@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn one_flip_is_a_neutral_chain_of_four() {
-        let statistics = pattern_statistics(&flipped_torus(9, 9, 1, 1));
+        let statistics = pattern_statistics(&flipped_torus(9, 10, 1, 1));
         assert_eq!(statistics.chains, [(4, 0)]);
         assert_eq!(statistics.pairs, 2);
         assert_eq!(statistics.census, DefectCensus { neutral_chains: 1, ..DefectCensus::default() });

@@ -121,7 +121,7 @@ const TRACE_RECORDS: usize = 100;
 
 impl Default for PolishSettings {
     fn default() -> Self {
-        Self { steps: 3000, range: 2.0, tolerance: 1e-5 }
+        Self { steps: 6000, range: 2.0, tolerance: 1e-5 }
     }
 }
 

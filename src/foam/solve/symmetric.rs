@@ -38,6 +38,9 @@ pub(crate) struct SymmetricFactor<'a> {
 /// Steps of iterative refinement: each gains the digits that pivoting would have saved.
 const REFINEMENTS: usize = 3;
 
+/// What is taken off a zero diagonal, as a part of the largest entry: refinement restores ten digits at a step.
+const SOFTENING: f64 = 1e-10;
+
 /// From this size on the factorization is worth more than one thread.
 const PARALLEL: usize = 20_000;
 
@@ -70,6 +73,7 @@ impl SymmetricPattern {
         let memory = FactorError::Memory { unknowns: self.size };
         let matrix =
             SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, entries).map_err(|_| memory)?;
+        let softened = softened(&matrix);
         let parallel = if self.size >= PARALLEL { Par::rayon(0) } else { Par::Seq };
         let mut values = vec![0.0; self.cholesky.len_val()];
         let scratch = self.cholesky.factorize_numeric_ldlt_scratch::<f64>(parallel, Default::default());
@@ -77,7 +81,7 @@ impl SymmetricPattern {
         self.cholesky
             .factorize_numeric_ldlt(
                 &mut values,
-                matrix.as_ref(),
+                softened.as_ref(),
                 Side::Lower,
                 Default::default(),
                 parallel,
@@ -107,6 +111,23 @@ impl SymmetricPattern {
             }
         }
     }
+}
+
+/// A small part of the largest entry is taken off diagonals that are zero, as those of multipliers are: without pivoting
+/// they could not come first. Refinement takes the true matrix.
+fn softened(matrix: &SparseColMat<usize, f64>) -> SparseColMat<usize, f64> {
+    let largest = matrix.val().iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let mut softened = matrix.clone();
+    let zeros: Vec<usize> = (0..matrix.ncols())
+        .flat_map(|column| matrix.col_ptr()[column]..matrix.col_ptr()[column + 1])
+        .zip(matrix.triplet_iter())
+        .filter(|(_, entry)| entry.row == entry.col && entry.val.abs() <= 0.0)
+        .map(|(at, _)| at)
+        .collect();
+    for at in zeros {
+        softened.val_mut()[at] -= SOFTENING * largest;
+    }
+    softened
 }
 
 impl SymmetricFactor<'_> {
