@@ -6,6 +6,8 @@
 //!
 //! The same commands in Surface Evolver: `g 10` after five and six `r` of cube.fe; quote its user seconds.
 
+#![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
+
 use combwright::evolver::{
     Document, parse_commands,
     session::{Host, Session},

@@ -35,7 +35,7 @@ impl Grid {
         (0..3).map(|axis| (self.high[axis] - self.low[axis]) / self.cells[axis] as f64).fold(0.0, f64::max)
     }
 
-    /// About how many bytes [`march`] holds at its peak: planes of signs and vertex numbers, and the mesh of a surface that
+    /// About how many bytes [`super::march`] holds at its peak: planes of signs and vertex numbers, and the mesh of a surface that
     /// fills the box like one sheet per `period`.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "an estimate")]

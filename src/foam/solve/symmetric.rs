@@ -73,21 +73,25 @@ impl SymmetricPattern {
         let memory = FactorError::Memory { unknowns: self.size };
         let matrix =
             SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, entries).map_err(|_| memory)?;
-        let softened = softened(&matrix);
         let parallel = if self.size >= PARALLEL { Par::rayon(0) } else { Par::Seq };
         let mut values = vec![0.0; self.cholesky.len_val()];
         let scratch = self.cholesky.factorize_numeric_ldlt_scratch::<f64>(parallel, Default::default());
         let mut buffer = MemBuffer::try_new(scratch).map_err(|_| memory)?;
-        self.cholesky
-            .factorize_numeric_ldlt(
-                &mut values,
-                softened.as_ref(),
-                Side::Lower,
-                Default::default(),
-                parallel,
-                MemStack::new(&mut buffer),
-                Default::default(),
-            )
+        let mut factor = |matrix: &SparseColMat<usize, f64>| {
+            self.cholesky
+                .factorize_numeric_ldlt(
+                    &mut values,
+                    matrix.as_ref(),
+                    Side::Lower,
+                    Default::default(),
+                    parallel,
+                    MemStack::new(&mut buffer),
+                    Default::default(),
+                )
+                .map(|_| ())
+        };
+        factor(&matrix)
+            .or_else(|_| factor(&softened(&matrix)))
             .map_err(|_| FactorError::Singular { unknowns: self.size })?;
         let negative = self.negative_pivots(&values);
         Ok(SymmetricFactor { pattern: self, matrix, values, negative })
@@ -113,8 +117,8 @@ impl SymmetricPattern {
     }
 }
 
-/// A small part of the largest entry is taken off diagonals that are zero, as those of multipliers are: without pivoting
-/// they could not come first. Refinement takes the true matrix.
+/// For a matrix whose order puts a zero diagonal first, as those of multipliers are: a small part of the largest entry is
+/// taken off each. Refinement takes the true matrix.
 fn softened(matrix: &SparseColMat<usize, f64>) -> SparseColMat<usize, f64> {
     let largest = matrix.val().iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     let mut softened = matrix.clone();
