@@ -143,7 +143,8 @@ fn panel(
     joined: bool,
 ) -> Result<(), ChartError> {
     let across = bounds(points.iter().map(|point| point.0));
-    let up = bounds(points.iter().flat_map(|point| [point.1, point.2]));
+    let drawn = bounds(points.iter().flat_map(|point| [point.1, point.2]));
+    let up = drawn.start..drawn.end + LEGEND * (drawn.end - drawn.start);
     let digits = digits_of(up.end - up.start);
     let wide = digits_of(across.end - across.start);
     let text = || (FONT, 15).into_font().color(&rgb(INK));
@@ -161,8 +162,8 @@ fn panel(
         .label_style(text())
         .x_labels(7)
         .y_labels(7)
-        .x_label_formatter(&|value| format!("{value:.wide$}"))
-        .y_label_formatter(&|value| format!("{value:.digits$}"))
+        .x_label_formatter(&|&value| rounded(value, wide))
+        .y_label_formatter(&|&value| rounded(value, digits))
         .light_line_style(WHITE)
         .draw()
         .map_err(failed)?;
@@ -193,6 +194,15 @@ fn panel(
         .map_err(failed)
 }
 
+/// Room above the points for the legend, as a part of their range.
+const LEGEND: f64 = 0.2;
+
+/// A tick's label; a zero that rounding has made negative is a zero.
+fn rounded(value: f64, digits: usize) -> String {
+    let label = format!("{value:.digits$}");
+    if label.trim_start_matches(['-', '0', '.']).is_empty() { label.replace('-', "") } else { label }
+}
+
 /// Decimals that tell a fiftieth of a range.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a dozen")]
 fn digits_of(range: f64) -> usize {
@@ -206,7 +216,7 @@ const HEAD: u32 = 60;
 /// Space for the colour bar.
 const BAR: u32 = 150;
 /// Cells of the mesh that is drawn, along the longest axis.
-const CELLS: f64 = 72.0;
+const CELLS: f64 = 128.0;
 
 /// The middle surface coloured by the energy of a bubble held there.
 ///
@@ -287,10 +297,9 @@ pub fn map(surface: &dyn LevelSet, samples: &[Sample], title: &str) -> Result<Op
     if !is_mapped || range[1] <= range[0] {
         return Ok(None);
     }
-    let scattered = Scattered::new(surface, known);
-    let energy = |p: DVec3| {
-        // A torus is the same round its axis and on both sides of its plane.
-        scattered.at(if is_torus { DVec3::new(p.x.hypot(p.y), 0.0, p.z.abs()) } else { p })
-    };
-    picture(surface, &energy, range, title).map(Some)
+    // A torus is the same round its axis and on both sides of its plane.
+    let folded = |p: DVec3| if is_torus { DVec3::new(p.x.hypot(p.y), 0.0, p.z.abs()) } else { p };
+    let known: Vec<(DVec3, f64)> = known.into_iter().map(|(place, energy)| (folded(place), energy)).collect();
+    let scattered = Scattered::new(surface, &known);
+    picture(surface, &|p| scattered.at(folded(p)), range, title).map(Some)
 }

@@ -9,6 +9,7 @@ use crate::{
     foam::{convert::as_f64, setup::FoamSpace},
     surface::{Gap, LevelSet, SurfaceSamples},
 };
+use faer::{Mat, prelude::Solve};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -156,37 +157,79 @@ fn farthest(surface: &dyn LevelSet, count: usize) -> Vec<DVec3> {
     chosen
 }
 
-/// A value between scattered samples, modulo the symmetries of a surface: the mean with weights that fall with the fourth
-/// power of the distance, among the nearest.
+/// A value between scattered samples, modulo the symmetries of a surface: the interpolant c + Σ λᵢ |p − pᵢ| with Σ λᵢ = 0,
+/// which joins samples on a line by straight pieces (R. Franke, Mathematics of Computation 38, 1982).
 #[derive(Clone, Debug)]
 pub struct Scattered {
     orbits: Orbits,
-    samples: Vec<(DVec3, f64)>,
+    places: Vec<DVec3>,
+    weights: Vec<f64>,
+    constant: f64,
 }
 
-/// Samples that count at a point.
-const NEIGHBOURS: usize = 5;
+/// Samples nearer to each other than this, in the surface's unit, are one: their rows could not be told apart.
+const SAME_PLACE: f64 = 1e-6;
 
 impl Scattered {
-    /// From values at places.
+    /// From values at places. Of samples at one place the first counts.
     #[must_use]
-    pub fn new(surface: &dyn LevelSet, samples: Vec<(DVec3, f64)>) -> Self {
-        Self { orbits: Orbits::of(surface), samples }
+    pub fn new(surface: &dyn LevelSet, samples: &[(DVec3, f64)]) -> Self {
+        let orbits = Orbits::of(surface);
+        let mut places: Vec<DVec3> = Vec::new();
+        let mut values = Vec::new();
+        for &(place, value) in samples {
+            if places.iter().all(|&other| orbits.distance(place, other) > SAME_PLACE) {
+                places.push(place);
+                values.push(value);
+            }
+        }
+        let count = places.len();
+        let system = Mat::from_fn(count + 1, count + 1, |i, j| match (i == count, j == count) {
+            (false, false) => orbits.distance(places[i], places[j]),
+            (true, true) => 0.0,
+            _ => 1.0,
+        });
+        let sides = Mat::from_fn(count + 1, 1, |i, _| values.get(i).copied().unwrap_or(0.0));
+        let solution = system.partial_piv_lu().solve(&sides);
+        let weights = (0..count).map(|i| solution[(i, 0)]).collect();
+        Self { orbits, places, weights, constant: solution[(count, 0)] }
     }
 
     /// The value at `p`; not a number without samples.
     #[must_use]
     pub fn at(&self, p: DVec3) -> f64 {
-        let mut near: Vec<(f64, f64)> =
-            self.samples.iter().map(|&(q, value)| (self.orbits.distance(p, q), value)).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(NEIGHBOURS);
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for (distance, value) in near {
-            let weight = distance.max(1e-9).powi(-4);
-            sum += weight * value;
-            weights += weight;
+        let parts =
+            self.places.iter().zip(&self.weights).map(|(&q, weight)| weight * self.orbits.distance(p, q));
+        self.constant + parts.sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::{Plane, SchwarzP};
+
+    #[test]
+    fn a_line_of_samples_is_joined_by_straight_pieces() {
+        let plane = Plane { periods: [8.0, 8.0] };
+        let heights = [1.0, 3.0, 2.0, 2.5];
+        let samples: Vec<(DVec3, f64)> =
+            heights.iter().zip([0.0, 0.5, 1.5, 2.0]).map(|(&value, x)| (x * DVec3::X, value)).collect();
+        let between = Scattered::new(&plane, &samples);
+        for (&(p, value), &(q, next)) in samples.iter().zip(&samples[1..]) {
+            // Sums of a few numbers of order one.
+            assert!((between.at(p) - value).abs() < 1e-12);
+            assert!((between.at(p.lerp(q, 0.3)) - (0.7 * value + 0.3 * next)).abs() < 1e-12);
         }
-        sum / weights
+    }
+
+    #[test]
+    fn images_of_a_sample_have_its_value() {
+        let surface = SchwarzP { period: 1.0 };
+        let (neck, flat) = (DVec3::new(0.0, 0.5, 0.25), DVec3::splat(0.25));
+        let between = Scattered::new(&surface, &[(neck, 2.0), (flat, 1.0), (DVec3::splat(0.75), 5.0)]);
+        for (p, value) in [(DVec3::new(0.5, 1.0, 0.75), 2.0), (DVec3::new(0.25, 0.75, 0.25), 1.0)] {
+            assert!((between.at(p) - value).abs() < 1e-12, "{p}");
+        }
     }
 }
