@@ -4,7 +4,8 @@
 
 use combwright::{
     foam::{
-        bubble::{Chart, Meshes, NoBubble, ThinGap, held, landing, settled},
+        bubble::{Chart, Meshes, NoBubble, ThinGap, cluster, flat_perimeter, held, landing, settled},
+        relax::Ending,
         setup::{FoamSpace, PeriodicSurface, PeriodicWalls},
     },
     surface::Gap,
@@ -85,18 +86,19 @@ fn a_torus_pushes_to_its_outer_equator_as_thin_gaps_say() -> Result<(), NoBubble
 #[test]
 fn bubbles_on_the_p_surface_change_from_flat_points_to_necks_as_they_grow() -> Result<(), NoBubble> {
     let gap = p_gap();
-    // Volume, energies at the flat point and at the neck, falling directions at both. The bubbles at the neck bend round it:
-    // from V = 0.004 on the reference lies above the limit of the meshes by up to 1.6e-4, as a coarser shape would.
-    for (volume, flat, neck, falling, off_neck) in [
-        (0.0005, 0.015_526_558, 0.019_732_228, [0, 2], 1e-6),
-        (0.002, 0.032_976_688, 0.037_656_868, [0, 2], 1e-6),
-        (0.004, 0.050_112_830, 0.051_530_296, [0, 0], 1e-5),
-        (0.005, 0.057_853_460, 0.057_124_265, [0, 0], 2e-5),
-        (0.007, 0.072_373_044, 0.067_141_360, [2, 0], 6e-5),
-        (0.010, 0.091_995_94, 0.080_835_655, [2, 0], 2e-4),
+    // Volume, energies at the flat point (measured to 1e-7) and at the neck (`analysis/README_bubble.md`: a global expansion,
+    // converged to 1e-11), falling directions at both. The largest bubbles bend round the neck, and the limit of the meshes
+    // errs there by up to 1e-6.
+    for (volume, flat, neck, falling) in [
+        (0.0005, 0.015_526_558, 0.019_732_225_087, [0, 2]),
+        (0.002, 0.032_976_688, 0.037_656_858_728, [0, 2]),
+        (0.004, 0.050_112_830, 0.051_530_047_914, [0, 0]),
+        (0.005, 0.057_853_460, 0.057_123_535_412, [0, 0]),
+        (0.007, 0.072_373_044, 0.067_138_201_779, [2, 0]),
+        (0.010, 0.091_995_94, 0.080_823_231_223, [2, 0]),
     ] {
         for (place, energy, falling, tolerance) in
-            [(FLAT, flat, falling[0], 3e-7), (NECK, neck, falling[1], off_neck)]
+            [(FLAT, flat, falling[0], 3e-7), (NECK, neck, falling[1], 1.5e-6)]
         {
             let bubble = held(&gap, volume, place, &Meshes::fine())?;
             let off = bubble.energy / energy - 1.0;
@@ -122,6 +124,56 @@ fn free_bubbles_slide_to_where_they_are_stable() -> Result<(), NoBubble> {
     from_neck.sort_by(f64::total_cmp);
     assert!(end.is_minimum() && from_neck[2] < 1e-6, "{} {:?}", end.bubble.place, end.landing);
     assert!(end.bubble.energy < 0.0809, "{}", end.bubble.energy);
+    Ok(())
+}
+
+#[test]
+fn touching_bubbles_between_planes_are_those_of_the_plane() -> Result<(), NoBubble> {
+    const GAP: f64 = 0.2;
+    let plane = gap(FoamSpace::Plane { periods: [4.0, 4.0], height: GAP });
+    // The perimeter of two: 8π/3 + √3 over the root of the area 2π/3 + √3/4 of one.
+    assert!((flat_perimeter(2).unwrap() - 6.359_129_8).abs() < 5e-8);
+    for volumes in [&[0.02, 0.02][..], &[0.02; 3], &[0.02, 0.03], &[0.02, 0.03, 0.04]] {
+        let cluster = cluster(&plane, volumes, DVec3::ZERO)?;
+        assert_eq!((cluster.descended.ending, cluster.descended.unstable), (Ending::Converged, 0));
+        // In the plane a stretch by a factor f takes the perimeter by f and the areas by f²: E = 2 Σ p V. Pressures are limits
+        // of three meshes, which err by up to 1e-6 where unequal bubbles have pulled the first, even elements apart.
+        let work: f64 = 2.0 * cluster.pressures.iter().zip(volumes).map(|(p, v)| p * v).sum::<f64>();
+        assert!((work / cluster.energy - 1.0).abs() < 2e-6, "{volumes:?}: {work} {}", cluster.energy);
+        if volumes.iter().all(|v| (v - volumes[0]).abs() < 1e-12) {
+            let exact = flat_perimeter(volumes.len()).unwrap() * (volumes[0] * GAP).sqrt();
+            let off = cluster.energy / exact - 1.0;
+            println!("{} bubbles between planes: E {:.12}, off {off:.1e}", volumes.len(), cluster.energy);
+            assert!(off.abs() < 1e-8);
+        }
+        // Tangents of quadratic elements at their ends: a first-order measure on arcs of 240° in 18 elements.
+        assert!(cluster.border_angle_error() < 0.02, "{}", cluster.border_angle_error());
+    }
+    Ok(())
+}
+
+#[test]
+fn pressures_of_touching_bubbles_are_the_slopes_of_their_energy() -> Result<(), NoBubble> {
+    let sphere = gap(FoamSpace::Sphere { radii: [1.0, 1.1] });
+    for (gap, volume, place) in [(p_gap(), 0.002, FLAT), (sphere, 0.02, 1.05 * DVec3::Z)] {
+        for count in [2, 3] {
+            let at = |change: f64| {
+                let mut volumes = vec![volume; count];
+                volumes[0] += change * volume;
+                cluster(&gap, &volumes, place)
+            };
+            let (here, more, less) = (at(0.0)?, at(1e-3)?, at(-1e-3)?);
+            assert_eq!((here.descended.ending, here.descended.unstable), (Ending::Converged, 0), "{place}");
+            let slope = (more.energy - less.energy) / (2e-3 * volume);
+            // The limits of the meshes err by about 1e-9 of the energy, over a change of the volume of 2e-3.
+            assert!(
+                (slope / here.pressures[0] - 1.0).abs() < 1e-5,
+                "{count} at {place}: {slope} {:?}",
+                here.pressures
+            );
+        }
+    }
+    assert!(matches!(cluster(&p_gap(), &[0.001; 4], FLAT), Err(NoBubble::Count { count: 4 })));
     Ok(())
 }
 

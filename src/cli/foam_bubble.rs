@@ -9,12 +9,13 @@ use super::{
 use crate::{
     foam::{
         bubble::{
-            Bubble, Chart, Landing, Meshes, NoBubble, Sample, ThinGap, held, landing, patch, route, scan,
-            scan_route, settled, shape_modes, usual_route,
+            Bubble, Chart, Landing, Meshes, NoBubble, Sample, ThinGap, cluster, flat_perimeter, held,
+            landing, patch, route, scan, scan_route, settled, shape_modes, usual_route,
         },
+        relax::{Descended, Ending},
         setup::FoamSpace,
     },
-    report::{bubble as report, folder::OutputFolder},
+    report::{bubble as report, bubble_cluster as cluster_report, folder::OutputFolder},
     surface::Gap,
 };
 use glam::DVec3;
@@ -27,32 +28,31 @@ use std::path::PathBuf;
 /// whether the place is a minimum, are reported; with --free it slides to where it is stable. Lengths are in units of the
 /// surface, energies in units of tension times length².
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:
+#[command(
+    next_help_heading = "Bubble",
+    after_help = "Examples:
   combwright foam bubble --surface sphere --radii 20,20.5 --volume 0.5
   combwright foam bubble --surface torus --ring 5 --tube 0.9,1.0 --volume 0.005 --at 4.05,0,0 --free
   combwright foam bubble --surface torus --ring 5 --tube 0.9,1.0 --volume 0.005 --scan 64 -o out
   combwright foam bubble --volume 0.01 --at 0.25,0.25,0.25
-  combwright foam bubble --volume 0.002 --patch 64 -o out")]
+  combwright foam bubble --volume 0.002 --patch 64 -o out
+  combwright foam bubble --surface plane --periods 4,4 --height 0.2 --volume 0.02 --count 2
+  combwright foam bubble --volume 0.002 --count 3 --at 0.25,0.25,0.25 -o out"
+)]
 pub(super) struct BubbleArguments {
     #[command(flatten)]
     pub(super) space: SpaceArguments,
     /// The volume of the bubble
-    #[arg(long, value_name = "V", allow_negative_numbers = true, help_heading = "Bubble")]
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
     pub(super) volume: f64,
     /// The place of its centre, on the middle surface [default: where the scan of the surface would begin]
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        allow_negative_numbers = true,
-        help_heading = "Bubble"
-    )]
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
     pub(super) at: Option<Vec<f64>>,
     /// Let the bubble slide to where it is stable
-    #[arg(long, conflicts_with_all = ["scan", "patch"], help_heading = "Bubble")]
+    #[arg(long, conflicts_with_all = ["scan", "patch"])]
     pub(super) free: bool,
     /// Hold it at COUNT places along a route: round the tube, from a flat point to a neck, or from --at to --to
-    #[arg(long, value_name = "COUNT", conflicts_with = "patch", help_heading = "Bubble")]
+    #[arg(long, value_name = "COUNT", conflicts_with = "patch")]
     pub(super) scan: Option<usize>,
     /// The end of the route
     #[arg(
@@ -61,13 +61,15 @@ pub(super) struct BubbleArguments {
         value_delimiter = ',',
         allow_negative_numbers = true,
         requires = "scan",
-        requires = "at",
-        help_heading = "Bubble"
+        requires = "at"
     )]
     pub(super) to: Option<Vec<f64>>,
     /// Hold it at COUNT places spread over the part of the surface that its symmetries repeat
-    #[arg(long, value_name = "COUNT", help_heading = "Bubble")]
+    #[arg(long, value_name = "COUNT")]
     pub(super) patch: Option<usize>,
+    /// So many bubbles of this volume that touch each other, free to slide and turn
+    #[arg(long, value_name = "1|2|3", default_value_t = 1, conflicts_with_all = ["free", "scan", "patch"])]
+    pub(super) count: usize,
     /// The folder for table, charts and pictures [default for --scan and --patch: bubble-out]
     #[arg(short = 'o', long, value_name = "FOLDER", help_heading = "Run")]
     pub(super) output: Option<PathBuf>,
@@ -118,7 +120,8 @@ pub(super) fn run(arguments: &BubbleArguments) -> Result<(), CliError> {
             let samples = scan(&gap, arguments.volume, &places, &Meshes::medium());
             landscape(arguments, &space, &gap, samples.map_err(CliError::mistake)?)
         }
-        (None, None) => one(arguments, &space, &gap, at),
+        (None, None) if arguments.count == 1 => one(arguments, &space, &gap, at),
+        (None, None) => touching(arguments, &space, &gap, at),
     }
 }
 
@@ -160,11 +163,87 @@ fn no_bubble(error: NoBubble) -> CliError {
     }
 }
 
-fn one(arguments: &BubbleArguments, space: &FoamSpace, gap: &Gap, at: Option<DVec3>) -> Result<(), CliError> {
-    let at = match at {
-        Some(at) => at,
-        None => patch(space, gap, 1).first().copied().unwrap_or_default(),
+/// Where a bubble is put when nothing is said.
+fn first_place(space: &FoamSpace, gap: &Gap) -> DVec3 {
+    patch(space, gap, 1).first().copied().unwrap_or_default()
+}
+
+/// The name and version of `cluster.json`.
+const CLUSTER_SCHEMA: &str = "combwright.cluster/1";
+
+/// The figures of a pair or a triple.
+#[derive(Serialize)]
+struct ClusterSummary<'a> {
+    schema: &'static str,
+    space: FoamSpace,
+    bubbles: usize,
+    volume: f64,
+    energy: f64,
+    energy_error: f64,
+    flat_energy: f64,
+    pressures: &'a [f64],
+    centre: DVec3,
+    border_angle_error_deg: f64,
+    ended: String,
+    unstable: usize,
+}
+
+/// A pair or a triple.
+fn touching(
+    arguments: &BubbleArguments,
+    space: &FoamSpace,
+    gap: &Gap,
+    at: Option<DVec3>,
+) -> Result<(), CliError> {
+    let at = at.unwrap_or_else(|| first_place(space, gap));
+    let (count, volume) = (arguments.count, arguments.volume);
+    // More than three are refused by the library; a vast count makes no vast list.
+    let cluster = cluster(gap, &vec![volume; count.min(MOST_PLACES)], at).map_err(no_bubble)?;
+    let centre = cluster.centre();
+    let height = Chart::new(gap, centre).and_then(|chart| chart.height()).map_err(no_bubble)?;
+    let flat = flat_perimeter(count).unwrap_or(f64::NAN) * (volume * height).sqrt();
+    let Descended { ending, steps, residuals, unstable } = cluster.descended;
+    let ended = match ending {
+        Ending::Converged => format!("converged in {steps} Newton steps"),
+        _ => format!("stopped after {steps} Newton steps"),
     };
+    let pressures = cluster.pressures.iter().map(|p| format!("{p:.9}")).collect::<Vec<_>>().join(", ");
+    let angle = cluster.border_angle_error().to_degrees();
+    let lines = vec![
+        ("space", space.to_string()),
+        ("bubbles", format!("{count} of volume {volume}")),
+        ("centre", coordinates(centre)),
+        ("energy", format!("{:.12} ± {:.0e}", cluster.energy, cluster.energy_error)),
+        ("between plane walls", format!("{flat:.12} at the gap {height:.6} of the centre")),
+        ("pressures", pressures),
+        ("borders off 120°", format!("{angle:.4}° at most, on the finest mesh")),
+        ("ended", format!("{ended}, largest force {:.1e}", residuals.force)),
+        ("falling directions", unstable.to_string()),
+    ];
+    let Some(output) = &arguments.output else { return print_lines(lines) };
+    let mut folder = OutputFolder::begin(output)?;
+    let summary = ClusterSummary {
+        schema: CLUSTER_SCHEMA,
+        space: *space,
+        bubbles: count,
+        volume,
+        energy: cluster.energy,
+        energy_error: cluster.energy_error,
+        flat_energy: flat,
+        pressures: &cluster.pressures,
+        centre,
+        border_angle_error_deg: angle,
+        ended,
+        unstable,
+    };
+    folder.write_json("cluster.json", &summary)?;
+    let title = format!("{space}: {count} bubbles of volume {volume}");
+    cluster_report::picture(&cluster, gap, &title)?.write_png(&mut folder, "cluster", 1.0)?;
+    finished(folder, lines)
+}
+
+fn one(arguments: &BubbleArguments, space: &FoamSpace, gap: &Gap, at: Option<DVec3>) -> Result<(), CliError> {
+    let at = at.unwrap_or_else(|| first_place(space, gap));
     let meshes = Meshes::fine();
     let (bubble, landing, mut lines) = if arguments.free {
         let end = settled(gap, arguments.volume, at, &meshes).map_err(no_bubble)?;

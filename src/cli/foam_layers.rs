@@ -9,14 +9,14 @@ use super::{
 use crate::{
     foam::{
         layers::{
-            Arrangement, Companions, Division, LayerFigures, Layers, NoLayers, corner_angles, layer_figures,
-            plane_end, relaxed, sheets, tetrahedral_angle,
+            Arrangement, Companions, Compared, Division, LayerFigures, LayerSettings, Layers, NoLayers,
+            charged, companions, corner_angles, layer_figures, plane_end, relaxed, sheets, tetrahedral_angle,
         },
         relax::Ending,
         seeds::SeedError,
         setup::FoamSpace,
     },
-    report::{folder::OutputFolder, layers as report},
+    report::{folder::OutputFolder, layers as report, layers_defects},
 };
 use anyhow::anyhow;
 use serde::Serialize;
@@ -44,7 +44,7 @@ impl From<PatternName> for Arrangement {
 }
 
 /// The name and version of `summary.json`.
-const SCHEMA: &str = "combwright.layers-summary/1";
+const SCHEMA: &str = "combwright.layers-summary/2";
 
 /// Steps of the progress bar.
 const BAR: u64 = 1000;
@@ -66,11 +66,15 @@ struct Summary<'a> {
     steps: usize,
     force: f64,
     unstable: usize,
+    /// Changes of topology on the way.
+    flips: usize,
     vanishing_borders: usize,
     volume_spread: f64,
     corner_angle_mean_deg: f64,
     corner_angle_worst_deg: f64,
     layers: &'a [LayerFigures; 2],
+    /// How the defects of the layers sit to each other.
+    defects: &'a Companions,
     seconds: f64,
 }
 
@@ -92,16 +96,29 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     // The same number of elements on each half side; the default is the coarsest.
     let fineness = if fine { settings.relax.strips.along } else { 1 };
     let tolerance = settings.relax.tolerance.max(1e-10);
-    let layers = relaxed(division, &gap, fineness, sheets.spacing, tolerance, &mut |told| {
+    let how = LayerSettings { fineness, tolerance, ..LayerSettings::new(sheets.spacing) };
+    let layers = relaxed(division, &gap, &how, &mut |told| {
         bar.set_message(format!("force {:.1e}", told.residuals.force));
         interrupt::flow()
     });
     let layers = layers.map_err(failed)?;
     bar.finish_and_clear();
-    let figures = layer_figures(&layers.division, sheets.spacing);
+    let figures = layer_figures(&layers.division);
+    let sides = [&figures[0].sides[..], &figures[1].sides].concat();
+    let defects = companions(&layers.division, &gap, &sides, sheets.spacing, settings.seeds.seed);
     let title = format!("{}, {cells} cells on each wall, {}", settings.space, arrangement.name());
     report::write_cells(&mut folder, &layers, &figures)?;
     report::picture(&layers, &figures, &gap, &title)?.write_png(&mut folder, "layers", 1.0)?;
+    if defects.defects.iter().sum::<usize>() > 0 {
+        let on_surface = charged(&layers.division, &gap, &sides);
+        layers_defects::picture(&on_surface, &gap, sheets.spacing, &title)?.write_png(
+            &mut folder,
+            "defects",
+            1.0,
+        )?;
+        let chart = layers_defects::chart(&defects, &title).map_err(CliError::failure)?;
+        chart.write(&mut folder, "chance", 1.0)?;
+    }
     let angles = angles(&layers);
     let summary = Summary {
         schema: SCHEMA,
@@ -117,11 +134,13 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         steps: layers.descended.steps,
         force: layers.descended.residuals.force,
         unstable: layers.descended.unstable,
+        flips: layers.flips,
         vanishing_borders: layers.vanishing.len(),
         volume_spread: layers.volume_spread(),
         corner_angle_mean_deg: angles[0],
         corner_angle_worst_deg: angles[1],
         layers: &figures,
+        defects: &defects,
         seconds: began.elapsed().as_secs_f64(),
     };
     folder.write_json("summary.json", &summary)?;
@@ -129,8 +148,9 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     for (name, figures) in [("lower layer", &figures[0]), ("upper layer", &figures[1])] {
         lines.push((name, in_words(figures)));
     }
-    lines.extend(companions("defects, lower to upper", &figures[0].companions));
-    lines.extend(companions("defects, upper to lower", &figures[1].companions));
+    if defects.defects.iter().all(|&count| count > 0) {
+        lines.extend(in_figures(&defects));
+    }
     lines.push(("time", format!("{:.1} s", summary.seconds)));
     finished(folder, lines)
 }
@@ -163,10 +183,7 @@ fn ended(layers: &Layers) -> String {
         }
         Ending::Stalled => format!("stalled after {} steps, {vanishing} borders vanishing", descended.steps),
         Ending::Halted => {
-            format!(
-                "stopped after {} steps: {vanishing} borders vanish, where the foam would change its topology",
-                descended.steps
-            )
+            format!("stopped after {} steps, {vanishing} borders vanishing", descended.steps)
         }
     }
 }
@@ -185,6 +202,7 @@ fn table(summary: &Summary<'_>, layers: &Layers) -> Vec<Line> {
     }
     lines.extend([
         ("ended", summary.ended.clone()),
+        ("changes of topology", summary.flips.to_string()),
         ("largest force", format!("{:.1e}", summary.force)),
         ("falling directions", summary.unstable.to_string()),
         ("spread of volumes", format!("{:.1e}", summary.volume_spread)),
@@ -203,9 +221,22 @@ fn in_words(figures: &LayerFigures) -> String {
     format!("sides {}; end films {}", by_sides(&figures.side_counts), by_sides(&figures.end_counts))
 }
 
-fn companions(name: &'static str, companions: &Companions) -> Option<Line> {
-    (companions.defects > 0 && companions.nearest.is_finite()).then(|| {
-        let Companions { defects, nearest, nearest_by_chance, charge_correlation } = companions;
-        (name, format!("{defects}, nearest at {nearest:.2} spacings ({nearest_by_chance:.2} by chance), correlation of charges {charge_correlation:+.2}"))
-    })
+/// How the layers' defects sit to each other.
+fn in_figures(defects: &Companions) -> Vec<Line> {
+    let chance = |compared: &Compared| {
+        let Compared { found, dealt, moved } = compared;
+        format!(
+            "{found:.3}; dealt anew {:.3} ± {:.3} (p = {:.3}), moved {:.3} ± {:.3} (p = {:.3})",
+            dealt.mean, dealt.deviation, dealt.p, moved.mean, moved.deviation, moved.p
+        )
+    };
+    vec![
+        (
+            "defects",
+            format!("{} in the lower layer, {} in the upper", defects.defects[0], defects.defects[1]),
+        ),
+        ("charges of touching cells", format!("correlation {:+.3}", defects.contact_correlation)),
+        ("charges over each other", chance(&defects.correlation)),
+        ("nearest defect opposite", chance(&defects.nearest)),
+    ]
 }

@@ -11,14 +11,15 @@
 //! | the enclosure's pictures and tables | `enclosure.rs`, `enclosure_section.rs`, `enclosure_drawing.rs` |
 //! | a relaxed foam as polygons, and for ParaView and viewers | `foam_surface.rs`, `foam_export.rs` |
 //! | the foam's picture, charts and tables; a partition's cells | `foam_picture.rs`, `foam_chart.rs`, `foam_files.rs` |
-//! | where a bubble wants to be: table, charts, coloured surface | `bubble.rs` |
-//! | two layers of cells: picture, table | `layers.rs` |
+//! | where a bubble wants to be: table, charts, coloured surface; a cluster | `bubble.rs`, `bubble_cluster.rs` |
+//! | two layers of cells: picture, table; defects of both and chance | `layers.rs`, `layers_defects.rs` |
 //! | what is written for a photograph of comb; the overlay | `comb.rs`, `comb_overlay.rs` |
 //! | comb on its wall, for ParaView | `comb_on_wall.rs` |
 //! | the page: text, scenes, photographs | `page.rs`, `page_scene.rs`, `page_photo.rs`, `page/`, `vendor/` |
 //! | a comparison's charts, tables and files | `compare_charts.rs`, `compare_map.rs`, `compare_files.rs` |
 
 pub mod bubble;
+pub mod bubble_cluster;
 pub mod comb;
 mod comb_on_wall;
 mod comb_overlay;
@@ -36,6 +37,7 @@ pub mod foam_picture;
 pub mod foam_surface;
 pub mod folder;
 pub mod layers;
+pub mod layers_defects;
 pub mod page;
 mod page_photo;
 mod page_scene;

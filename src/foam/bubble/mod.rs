@@ -13,6 +13,7 @@
 //! | a held bubble on several meshes, and their limit | `held.rs`, `extrapolate.rs` |
 //! | a bubble that meets itself | `touch.rs` |
 //! | the way of a free bubble; whether its end is a minimum | `settle.rs` |
+//! | two or three bubbles that touch | `cluster.rs` |
 //! | what thin gaps say | `thin.rs` |
 //! | many places: a route, or the patch that symmetries repeat | `landscape.rs`, `symmetry.rs` |
 //!
@@ -26,6 +27,7 @@
 mod annulus;
 mod balance;
 mod chart;
+mod cluster;
 mod extrapolate;
 mod held;
 mod landscape;
@@ -37,6 +39,7 @@ mod touch;
 
 pub use annulus::Annulus;
 pub use chart::Chart;
+pub use cluster::{Cluster, cluster, flat_perimeter};
 pub use extrapolate::{limit, limit_with_error};
 pub use held::{Bubble, Meshes, held, shape_modes};
 pub use landscape::{Sample, Scattered, patch, route, scan, scan_route, usual_route};
@@ -86,6 +89,12 @@ pub enum NoBubble {
     Touches {
         /// Its centre.
         place: DVec3,
+    },
+    /// A cluster of so many is not known.
+    #[error("{count} touching bubbles are not known: a pair has 2, a triple 3")]
+    Count {
+        /// As given.
+        count: usize,
     },
     /// Newton's steps did not end.
     #[error(

@@ -10,6 +10,7 @@ use crate::foam::{
     complex::{Complex, Element, Node, Places, RegionId},
     convert::as_f64,
     energy::{Blocks, FilmLoads, add_element},
+    solve::negative_eigenvalues,
     volume::{Reference, StripLoads, WallEdge, volumes},
 };
 use crate::index::{Id, IndexVec};
@@ -324,25 +325,6 @@ impl<'a> Sheet<'a> {
         });
         factor.solve_in_place(step.as_mut());
         let step = (0..n + CONSTRAINTS).map(|i| weight(i) * step[(i, 0)]).collect();
-        (step, negative(&factor))
+        (step, negative_eigenvalues(&factor))
     }
-}
-
-/// The negative eigenvalues of the block-diagonal factor: by Sylvester's law as many as the matrix has.
-fn negative(factor: &Lblt<f64>) -> usize {
-    let (diagonal, below) = (factor.B_diag().column_vector(), factor.B_subdiag().column_vector());
-    let mut count = 0;
-    let mut at = 0;
-    while at < diagonal.nrows() {
-        if at + 1 < diagonal.nrows() && below[at].abs() > 0.0 {
-            let (sum, product) =
-                (diagonal[at] + diagonal[at + 1], diagonal[at] * diagonal[at + 1] - below[at] * below[at]);
-            count += if product < 0.0 { 1 } else { 2 * usize::from(sum < 0.0) };
-            at += 2;
-        } else {
-            count += usize::from(diagonal[at] < 0.0);
-            at += 1;
-        }
-    }
-    count
 }

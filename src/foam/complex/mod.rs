@@ -8,7 +8,7 @@ mod shape;
 mod strips;
 
 pub use shape::Shape;
-pub(crate) use shape::{CurvePoint, MOST_NODES, ShapePoint, curve_points};
+pub(crate) use shape::{CurvePoint, MOST_NODES, ShapePoint, curve_points, quadratic};
 pub use strips::{NoExtrusion, Strips};
 
 use crate::{

@@ -1,6 +1,6 @@
 //! Two sheets of seeds.
 
-use super::{NoLayers, plane_end, spacing};
+use super::{Division, NoLayers, plane_end, spacing};
 use crate::{
     foam::{
         convert::as_f64,
@@ -8,7 +8,7 @@ use crate::{
         seeds::{Progress, SeedSettings, sow},
         setup::FoamSpace,
     },
-    surface::{Gap, SurfaceSamples, WallSide},
+    surface::{Curvature, Gap, SurfaceSamples},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -119,26 +119,59 @@ fn rows(arrangement: Arrangement, periods: [f64; 2], cells: usize) -> Result<She
     Ok(Sheets { seeds, lower: cells, spacing: spacing(periods[0] * periods[1], cells) })
 }
 
-/// Where a layer's seeds lie between the walls, from the lower one.
-const QUARTERS: [f64; 2] = [0.25, 0.75];
+/// How far from the middle surface the seeds of a layer are put, in spacings: where those of rows stand, so that the films
+/// between the layers slope as in natural comb.
+const HEIGHT: f64 = 0.41;
+/// Films between seeds at the distance `z` from the middle surface reach from it as far as `FARTHEST s²/4z` for the spacing `s`,
+/// from the corners of hexagons: a third of the spacing squared.
+const FARTHEST: f64 = 1.0 / 3.0;
+/// The part of half the gap that the films between the layers may fill at first.
+const FILLED: f64 = 0.65;
+/// The part of the least radius of curvature within which seeds stay: normals cross beyond it.
+const WITHIN: f64 = 0.8;
 
-/// Two sheets annealed on the middle surface with independent random numbers of one seed, then moved a quarter of the gap
-/// towards their walls.
+/// How much farther seeds are put where the cells of the nearest ones reach the other wall.
+const FARTHER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
+
+/// Two sheets annealed on the middle surface with independent random numbers of one seed, then moved along its normals to their
+/// sides; so far that flat cells reach their own wall only, even if that is beyond the wall.
 fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> Result<Sheets, NoLayers> {
-    let domain = Domain::of_surface(gap.middle().as_ref());
+    let middle = gap.middle().as_ref();
+    let domain = Domain::of_surface(middle);
     let settings = SeedSettings::new(cells, seed);
-    let [lower, upper] = WallSide::BOTH.map(|side| gap.wall(side));
-    let mut seeds = Vec::with_capacity(2 * cells);
-    for (layer, part) in QUARTERS.into_iter().enumerate() {
-        let level = lower.level + part * (upper.level - lower.level);
-        let stream = u64::from(crate::index::checked_u32(layer));
-        let sown = sow(gap, &domain, &settings, stream, &mut |share| {
+    let spacing = spacing(SurfaceSamples::new(middle, 0.0, AREA_LINES).area(), cells);
+    let mut places = Vec::with_capacity(2 * cells);
+    for layer in 0..2 {
+        let sown = sow(gap, &domain, &settings, layer, &mut |share| {
             progress(0.5 * (share + if layer == 0 { 0.0 } else { 1.0 }))
         })?;
-        for place in sown.points {
-            seeds.push(lower.field.project(place, level).map_err(|_| NoLayers::Lost { place })?);
+        places.extend(sown.points);
+    }
+    let moved = |farther: f64| -> Result<Sheets, NoLayers> {
+        let seeds = places.iter().enumerate().map(|(at, &place)| {
+            let away = farther * distance(gap, place, spacing)?;
+            let Curvature { gauss, mean } = middle.curvature(place);
+            let bend = mean.abs() + (mean * mean - gauss).max(0.0).sqrt();
+            let side = if at < cells { -1.0 } else { 1.0 };
+            Ok(place + side * away.min(WITHIN / bend) * middle.normal(place))
+        });
+        Ok(Sheets { seeds: seeds.collect::<Result<_, NoLayers>>()?, lower: cells, spacing })
+    };
+    let fits = |sheets: &Sheets| Division::new(gap, &domain, &sheets.seeds, cells, spacing).is_ok();
+    for farther in FARTHER {
+        let sheets = moved(farther)?;
+        if fits(&sheets) {
+            return Ok(sheets);
         }
     }
-    let area = SurfaceSamples::new(gap.middle().as_ref(), 0.0, AREA_LINES).area();
-    Ok(Sheets { seeds, lower: cells, spacing: spacing(area, cells) })
+    moved(FARTHER[0])
+}
+
+/// How far from the middle surface a seed is put.
+fn distance(gap: &Gap, place: DVec3, spacing: f64) -> Result<f64, NoLayers> {
+    let height = gap.local_gap(place);
+    if height.is_nan() {
+        return Err(NoLayers::Lost { place });
+    }
+    Ok((HEIGHT * spacing).max(FARTHEST * spacing * spacing / (2.0 * FILLED * height)))
 }

@@ -1,7 +1,7 @@
-//! What there is to count and to measure of two layers.
+//! What there is to count and to measure of the layers.
 
 use super::{Division, Layers};
-use crate::foam::{complex::NodeImage, convert::as_f64};
+use crate::foam::complex::NodeImage;
 use crate::index::Id;
 use glam::DVec3;
 use serde::Serialize;
@@ -24,26 +24,11 @@ pub struct LayerFigures {
     pub sides: Vec<usize>,
     /// The number of films at its end.
     pub ends: Vec<usize>,
-    /// How the cells that are no hexagons sit to those of the other layer.
-    pub companions: Companions,
 }
 
-/// How the defects of one layer sit to those of the other. Lengths are straight, in units of the spacing.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Companions {
-    /// Cells of this layer that are no hexagons.
-    pub defects: usize,
-    /// The mean distance from such a cell to the nearest of the other layer; not a number without any.
-    pub nearest: f64,
-    /// The same from all cells of this layer: what chance would give.
-    pub nearest_by_chance: f64,
-    /// The correlation, over this layer's cells, of 6 − n with its mean over the cells of the other layer that they touch.
-    pub charge_correlation: f64,
-}
-
-/// Side counts and defects of the lower and the upper layer. `spacing` is the unit of the distances.
+/// Side counts of the lower and the upper layer.
 #[must_use]
-pub fn layer_figures(division: &Division, spacing: f64) -> [LayerFigures; 2] {
+pub fn layer_figures(division: &Division) -> [LayerFigures; 2] {
     let cells = division.seeds.len();
     let (mut sides, mut across) = (vec![0_usize; cells], vec![Vec::new(); cells]);
     for polygon in &division.polygons {
@@ -58,15 +43,11 @@ pub fn layer_figures(division: &Division, spacing: f64) -> [LayerFigures; 2] {
             across[b].push(a);
         }
     }
-    [0..division.lower, division.lower..cells].map(|layer| {
-        let other: Vec<usize> = (0..cells).filter(|cell| !layer.contains(cell)).collect();
-        LayerFigures {
-            side_counts: counts(layer.clone().map(|cell| sides[cell])),
-            end_counts: counts(layer.clone().map(|cell| across[cell].len())),
-            sides: sides[layer.clone()].to_vec(),
-            ends: layer.clone().map(|cell| across[cell].len()).collect(),
-            companions: companions(division, &sides, &across, &layer, &other, spacing),
-        }
+    [0..division.lower, division.lower..cells].map(|layer| LayerFigures {
+        side_counts: counts(layer.clone().map(|cell| sides[cell])),
+        end_counts: counts(layer.clone().map(|cell| across[cell].len())),
+        sides: sides[layer.clone()].to_vec(),
+        ends: layer.clone().map(|cell| across[cell].len()).collect(),
     })
 }
 
@@ -79,45 +60,6 @@ fn counts(values: impl Iterator<Item = usize>) -> Vec<usize> {
         counts[value] += 1;
     }
     counts
-}
-
-fn companions(
-    division: &Division,
-    sides: &[usize],
-    across: &[Vec<usize>],
-    layer: &std::ops::Range<usize>,
-    other: &[usize],
-    spacing: f64,
-) -> Companions {
-    let far: Vec<DVec3> =
-        other.iter().filter(|&&cell| sides[cell] != 6).map(|&cell| division.seeds[cell]).collect();
-    let nearest = |cell: usize| {
-        let apart = |q: &DVec3| division.period.nearest_image(division.seeds[cell] - *q).length();
-        far.iter().map(apart).fold(f64::NAN, f64::min) / spacing
-    };
-    let charge = |cell: usize| 6.0 - as_f64(sides[cell]);
-    let pairs: Vec<(f64, f64)> = layer
-        .clone()
-        .filter(|&cell| !across[cell].is_empty())
-        .map(|cell| (charge(cell), mean(across[cell].iter().map(|&b| charge(b)))))
-        .collect();
-    Companions {
-        defects: layer.clone().filter(|&cell| sides[cell] != 6).count(),
-        nearest: mean(layer.clone().filter(|&cell| sides[cell] != 6).map(nearest)),
-        nearest_by_chance: mean(layer.clone().map(nearest)),
-        charge_correlation: correlation(&pairs),
-    }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-    sum / count
-}
-
-fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let (a, b) = (mean(pairs.iter().map(|p| p.0)), mean(pairs.iter().map(|p| p.1)));
-    let sum = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>();
-    sum(&|p| (p.0 - a) * (p.1 - b)) / (sum(&|p| (p.0 - a).powi(2)) * sum(&|p| (p.1 - b).powi(2))).sqrt()
 }
 
 /// The angles between the borders at every corner inside the gap where four of them meet, six to a corner, in radians.

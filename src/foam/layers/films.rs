@@ -3,13 +3,14 @@
 //! A film with `k` corners is cut into `k` quadrilaterals, from each corner to the middles of the two sides that meet there
 //! and to the middle of the film, of `fineness × fineness` biquadratic elements each. Borders are shared by their films;
 //! their nodes are slaved to the two corners, and those inside a film to all nodes round it, by mean value coordinates
-//! (M. S. Floater, "Mean value coordinates", CAGD 20, 2003), so that a film goes with its borders and its wall.
+//! (M. S. Floater, "Mean value coordinates", CAGD 20, 2003), so that a film goes with its borders and its wall. After a change
+//! of topology, borders and films that were not touched keep their places.
 
-use super::{Division, Polygon, division::CornerImage};
+use super::{Division, Polygon, division::CornerImage, flip::Renumbering};
 use crate::foam::{
     complex::{
         Complex, Element, Film, Motion, Node, NodeId, NodeImage, Places, Region, RegionId, RegionImage,
-        RegionKind, Shape, WallId,
+        RegionKind, Shape, WallId, quadratic,
     },
     convert::as_f64,
 };
@@ -18,7 +19,7 @@ use crate::{
     surface::{Gap, WallSide},
 };
 use glam::{DVec2, DVec3, IVec3};
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Range};
 
 /// A border or an edge on a wall: its two corners, the second in the frame of the first.
 pub type Side = (usize, usize, [i32; 3]);
@@ -33,20 +34,94 @@ pub struct LayerFilms {
     /// The nodes along each border, from its first corner to its second, in the frame of the first; edges on walls are not
     /// among them.
     pub borders: BTreeMap<Side, Vec<NodeImage>>,
+    /// The same of edges on walls.
+    pub wall_edges: BTreeMap<Side, Vec<NodeImage>>,
+    /// The nodes inside the film of each polygon.
+    inner: Vec<Range<usize>>,
 }
 
-/// Builds the complex of `division` with `fineness` elements on each half side.
+/// Builds the complex of `division` with `fineness` elements on each half side, from plane films.
 #[must_use]
 pub fn layer_films(division: &Division, gap: &Gap, fineness: usize) -> LayerFilms {
-    let mut builder = Builder::new(division, gap, fineness);
-    let films = division.polygons.iter().map(|polygon| builder.film(polygon)).collect();
+    build(division, gap, fineness, None)
+}
+
+/// Builds the complex anew after a change of topology.
+pub(super) fn films_after(
+    division: &Division,
+    gap: &Gap,
+    fineness: usize,
+    before: &LayerFilms,
+    renumbering: &Renumbering,
+) -> LayerFilms {
+    let mut corners = vec![None; division.corners.len()];
+    for (old, new) in renumbering.corners.iter().enumerate() {
+        if let Some(new) = *new {
+            corners[new] = Some(old);
+        }
+    }
+    build(division, gap, fineness, Some(&Before { films: before, corners, polygons: &renumbering.polygons }))
+}
+
+fn build(division: &Division, gap: &Gap, fineness: usize, before: Option<&Before<'_>>) -> LayerFilms {
+    let mut builder = Builder::new(division, gap, fineness, before);
+    let mut films = IndexVec::new();
+    let mut inner = Vec::with_capacity(division.polygons.len());
+    for (id, polygon) in division.polygons.iter().enumerate() {
+        builder.kept = before.and_then(|before| before.inner(id)).unwrap_or_default();
+        let (film, nodes) = builder.film(polygon);
+        films.push(film);
+        inner.push(nodes);
+    }
     let regions = division.seeds.iter().map(|&anchor| Region { kind: RegionKind::Cell, anchor }).collect();
     let walls: IndexVec<WallId, _> = gap.walls().to_vec().into();
-    let Builder { nodes, places, mut sides, .. } = builder;
+    let Builder { nodes, places, sides, .. } = builder;
     let complex = Complex { period: division.period, walls, regions, nodes, films };
-    sides.retain(|_, side| !side.is_on_wall);
-    let borders = sides.into_iter().map(|(key, side)| (key, side.nodes)).collect();
-    LayerFilms { complex, places, borders }
+    let (on_walls, borders): (BTreeMap<_, _>, BTreeMap<_, _>) =
+        sides.into_iter().partition(|(_, side)| side.is_on_wall);
+    let nodes =
+        |sides: BTreeMap<Side, SideNodes>| sides.into_iter().map(|(key, side)| (key, side.nodes)).collect();
+    LayerFilms { complex, places, borders: nodes(borders), wall_edges: nodes(on_walls), inner }
+}
+
+/// Builds the complex anew with other elements, where the films are.
+pub(super) fn films_refined(
+    division: &Division,
+    gap: &Gap,
+    fineness: usize,
+    before: &LayerFilms,
+) -> LayerFilms {
+    let corners = (0..division.corners.len()).map(Some).collect();
+    build(division, gap, fineness, Some(&Before { films: before, corners, polygons: &[] }))
+}
+
+/// Films before a change of topology or of the mesh.
+struct Before<'a> {
+    films: &'a LayerFilms,
+    /// The old number of each corner that was there.
+    corners: Vec<Option<usize>>,
+    /// The old number of each polygon that has kept its corners.
+    polygons: &'a [Option<usize>],
+}
+
+impl Before<'_> {
+    /// The place at `part` of the way along a side that was there.
+    fn on_side(&self, (first, last, shift): Side, part: f64) -> Option<DVec3> {
+        let key = (self.corners[first]?, self.corners[last]?, shift);
+        let nodes = self.films.borders.get(&key).or_else(|| self.films.wall_edges.get(&key))?;
+        let pieces = (nodes.len() - 1) / 2;
+        let along = part * as_f64(pieces);
+        let piece = (0..pieces).rfind(|&piece| as_f64(piece) <= along)?;
+        let place = |at: usize| self.films.complex.place(&self.films.places, nodes[2 * piece + at]);
+        let (weights, _) = quadratic(along - as_f64(piece));
+        Some((0..3).map(|at| weights[at] * place(at)).sum())
+    }
+
+    /// The places inside a film that was there, last to first.
+    fn inner(&self, polygon: usize) -> Option<Vec<DVec3>> {
+        let nodes = self.films.inner[(*self.polygons.get(polygon)?)?].clone();
+        Some(nodes.rev().map(|node| self.films.places[NodeId::from_index(node)]).collect())
+    }
 }
 
 struct SideNodes {
@@ -62,10 +137,13 @@ struct Builder<'a> {
     nodes: IndexVec<NodeId, Node>,
     places: Places,
     sides: BTreeMap<Side, SideNodes>,
+    before: Option<&'a Before<'a>>,
+    /// Places that inner nodes of the present film had before, last to first.
+    kept: Vec<DVec3>,
 }
 
 impl<'a> Builder<'a> {
-    fn new(division: &'a Division, gap: &'a Gap, fineness: usize) -> Self {
+    fn new(division: &'a Division, gap: &'a Gap, fineness: usize, before: Option<&'a Before<'a>>) -> Self {
         let nodes = division
             .corners
             .iter()
@@ -75,7 +153,8 @@ impl<'a> Builder<'a> {
             })
             .collect();
         let places = division.corners.iter().map(|corner| corner.place).collect();
-        Self { division, gap, half: 2 * fineness, nodes, places, sides: BTreeMap::new() }
+        let (sides, kept) = (BTreeMap::new(), Vec::new());
+        Self { division, gap, half: 2 * fineness, nodes, places, sides, before, kept }
     }
 
     fn add(&mut self, node: Node, place: DVec3) -> NodeId {
@@ -114,7 +193,8 @@ impl<'a> Builder<'a> {
         for at in 1..count {
             let part = as_f64(at) / as_f64(count);
             let masters = vec![(first, 1.0 - part), (last, part)];
-            let straight = start.lerp(end, part);
+            let kept = self.before.and_then(|before| before.on_side(key, part));
+            let straight = kept.unwrap_or_else(|| start.lerp(end, part));
             let (node, place) = match wall {
                 None => (Node { walls: Vec::new(), motion: Motion::Border(masters) }, straight),
                 Some(side) => {
@@ -128,7 +208,8 @@ impl<'a> Builder<'a> {
         SideNodes { nodes, is_on_wall: wall.is_some() }
     }
 
-    fn film(&mut self, polygon: &Polygon) -> Film {
+    /// The film, and the range of its inner nodes.
+    fn film(&mut self, polygon: &Polygon) -> (Film, Range<usize>) {
         let corners = &polygon.corners;
         let count = corners.len();
         let on_wall: BTreeMap<usize, WallSide> = self.division.wall_sides(polygon).collect();
@@ -136,9 +217,21 @@ impl<'a> Builder<'a> {
             .map(|at| self.side(corners[at], corners[(at + 1) % count], on_wall.get(&at).copied()))
             .collect();
         let patch = Patch::new(self, &sides);
-        let grid = self.inner_nodes(&sides, &patch);
+        let first = self.nodes.len();
+        let elements = self.quadrilaterals(&sides, &patch);
+        let side = |cell: usize, shift| RegionImage { region: RegionId::from_index(cell), shift };
+        let film = Film {
+            front: side(polygon.neighbour, polygon.shift),
+            back: side(polygon.cell, IVec3::ZERO),
+            tension: 1.0,
+            elements,
+        };
+        (film, first..self.nodes.len())
+    }
+
+    fn quadrilaterals(&mut self, sides: &[Vec<NodeImage>], patch: &Patch) -> Vec<Element> {
         let mut elements = Vec::new();
-        for quad in &grid {
+        for quad in self.inner_nodes(sides, patch) {
             for j in (0..self.half).step_by(2) {
                 for i in (0..self.half).step_by(2) {
                     let nodes = (0..9).map(|at| quad[j + at / 3][i + at % 3]).collect();
@@ -146,13 +239,7 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        let side = |cell: usize, shift| RegionImage { region: RegionId::from_index(cell), shift };
-        Film {
-            front: side(polygon.neighbour, polygon.shift),
-            back: side(polygon.cell, IVec3::ZERO),
-            tension: 1.0,
-            elements,
-        }
+        elements
     }
 
     /// For every corner the grid of nodes of its quadrilateral: `[j][i]`, `i` along the side that follows the corner, `j` back
@@ -199,7 +286,8 @@ impl<'a> Builder<'a> {
 
     fn inner(&mut self, patch: &Patch, at: DVec2) -> NodeImage {
         let weights = patch.weights(at);
-        let place = weights.iter().zip(&patch.places).map(|(&w, &p)| w * p).sum();
+        let drawn = || weights.iter().zip(&patch.places).map(|(&w, &p)| w * p).sum();
+        let place = self.kept.pop().unwrap_or_else(drawn);
         let masters = patch.nodes.iter().zip(weights).map(|(image, w)| (image.node, w)).collect();
         let node = self.add(Node { walls: Vec::new(), motion: Motion::Inner(masters) }, place);
         NodeImage { node, shift: IVec3::ZERO }

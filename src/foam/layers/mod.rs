@@ -8,28 +8,34 @@
 //! | two sheets of seeds: rhombic, Tóth's, or annealed on both sides | `arrangement.rs` |
 //! | their Voronoi cells, cut off by the walls; corners, polygons | `division.rs` |
 //! | the film complex: each polygon as curved quadrilaterals round its middle | `films.rs` |
-//! | the descent to least energy at equal volumes; films and borders that vanish | `relax.rs` |
+//! | the descent to least energy at equal volumes | `relax.rs` |
+//! | borders and films that vanish: changes of topology | `flip.rs` |
 //! | ends with plane films: energies by formula | `ends.rs` |
-//! | side counts, defects, how those of the two layers sit to each other; angles at corners | `figures.rs` |
+//! | side counts; angles at corners | `figures.rs` |
+//! | how the defects of the two layers sit to each other | `companions.rs` |
 //!
-//! Not promised: topology stays as the seeds made it. A border that shrinks to nothing stops the descent, and is reported.
+//! Not promised: a cell stays in its layer. Where it would reach the other wall, or leave its own, the descent ends and says
+//! so; nor do corners where more than four cells meet, as in the bees' arrangement, change.
 //!
 //! Sources: L. Fejes Tóth, "What the bees know and what they do not know", Bull. Amer. Math. Soc. 70 (1964); D. Weaire and
 //! R. Phelan, "Optimal design of honeycombs", Nature 367 (1994), who made both arrangements in foam between glass plates.
 
 mod arrangement;
+mod companions;
 mod division;
 mod ends;
 mod figures;
 mod films;
+mod flip;
 mod relax;
 
 pub use arrangement::{Arrangement, Sheets, sheets};
+pub use companions::{Chance, Charged, Companions, Compared, charged, companions};
 pub use division::{Corner, CornerImage, Division, Polygon, spacing};
 pub use ends::{PlaneEnd, plane_end};
-pub use figures::{Companions, LayerFigures, corner_angles, layer_figures, tetrahedral_angle};
+pub use figures::{LayerFigures, corner_angles, layer_figures, tetrahedral_angle};
 pub use films::{LayerFilms, Side, layer_films};
-pub use relax::{Layers, relaxed};
+pub use relax::{LayerSettings, Layers, relaxed};
 
 use crate::foam::{seeds::SeedError, solve::FactorError};
 use glam::DVec3;

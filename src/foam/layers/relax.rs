@@ -1,20 +1,31 @@
-//! The descent of a two-layer foam.
+//! The descent of a two-layer foam, with changes of topology where a border vanishes on the way.
 
-use super::{Division, LayerFilms, NoLayers, films::Side, layer_films};
+use super::{
+    Division, LayerFilms, NoLayers,
+    films::{Side, films_after, films_refined},
+    flip::{Cluster, Moves},
+    layer_films,
+};
 use crate::foam::{
-    complex::{NodeImage, Places, RegionId},
+    complex::{NodeId, NodeImage, Places, RegionId},
     convert::as_f64,
     energy::energy,
     relax::{Descended, Descent, DescentSettings, DescentStep, Ending},
 };
-use crate::{index::IndexVec, surface::Gap};
+use crate::{
+    index::{Id, IndexVec},
+    surface::Gap,
+};
 use glam::DVec3;
-use std::{collections::BTreeMap, ops::ControlFlow};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    ops::ControlFlow,
+};
 
 /// A two-layer foam.
 #[derive(Clone, Debug)]
 pub struct Layers {
-    /// Cells, corners and polygons, as the seeds made them.
+    /// Cells, corners and polygons at the end; corners where they ended.
     pub division: Division,
     /// The films where they ended.
     pub films: LayerFilms,
@@ -26,76 +37,279 @@ pub struct Layers {
     pub pressures: IndexVec<RegionId, f64>,
     /// The volumes.
     pub volumes: IndexVec<RegionId, f64>,
-    /// How the descent ended.
+    /// How the descent ended; its steps are those of all descents between changes of topology.
     pub descended: Descended,
-    /// Borders that had shrunk below a twentieth of the spacing at the end, and their lengths: here the foam would change its
-    /// topology.
+    /// Changes of topology.
+    pub flips: usize,
+    /// Borders that are shorter than a twentieth of the spacing although the descent has not converged, and their lengths.
     pub vanishing: Vec<(Side, f64)>,
 }
 
-/// Borders below this part of the spacing are about to vanish: between corners that near, films of a stable foam change
-/// neighbours.
-const VANISHING: f64 = 0.05;
-/// Below this part the descent stops: the elements beside such a border are slivers.
-const VANISHED: f64 = 0.004;
-/// The most Newton steps. Plane films of equal cells need about ten, annealed ones several dozen.
-const STEP_LIMIT: usize = 120;
+/// How a two-layer foam is relaxed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerSettings {
+    /// Elements on each half side of a film.
+    pub fineness: usize,
+    /// The size of a cell: the unit of forces and of the lengths at which topology changes.
+    pub spacing: f64,
+    /// The largest force at the end, in units of tension × spacing.
+    pub tolerance: f64,
+    /// The most Newton steps in all.
+    pub step_limit: usize,
+}
 
-/// Relaxes `division` at equal volumes on films of this fineness; `spacing` is the size of a cell, `tolerance` the largest force
-/// that may be left, in units of tension × spacing.
+impl LayerSettings {
+    /// The coarsest films, to a force of 1e-10.
+    #[must_use]
+    pub fn new(spacing: f64) -> Self {
+        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600 }
+    }
+}
+
+/// Borders below this part of the spacing that go on shrinking change the topology. Beyond it borders that would stay are
+/// flipped, below it elements beside them become slivers first.
+const VANISHING: f64 = 0.05;
+/// A triangle beside such a border becomes a border if all its sides are below this part: longer ones first shrink.
+const SMALL_FILM: f64 = 0.15;
+/// Steps of which less than this part could be taken are held up by slivers: then sides of triple that length go, shrinking or
+/// not.
+const HELD_UP: f64 = 0.05;
+const HELD_UP_BY: f64 = 3.0;
+/// So many such steps on end, with nothing to go, and the films are laid anew; at most so often.
+const MOST_HELD_UP: usize = 4;
+const MOST_SPREADS: usize = 12;
+/// By how much each flip of the same bodies lowers their threshold, so that none flips back and forth for ever.
+const WEARINESS: f64 = 0.6;
+
+/// The coarsest films.
+const FIRST_FINENESS: usize = 1;
+/// The force at which the first descent, on the coarsest films, ends: topology has settled by then.
+const FIRST_TOLERANCE: f64 = 1e-3;
+
+/// Relaxes `division` at equal volumes: first on the coarsest films, whose steps are cheap and where most changes of topology
+/// happen, then on those that were asked for.
 ///
 /// # Errors
 /// [`NoLayers::Factor`] if the system cannot be solved at all.
 pub fn relaxed(
     division: Division,
     gap: &Gap,
-    fineness: usize,
-    spacing: f64,
-    tolerance: f64,
+    settings: &LayerSettings,
     progress: &mut dyn FnMut(&DescentStep<'_>) -> ControlFlow<()>,
 ) -> Result<Layers, NoLayers> {
-    let films = layer_films(&division, gap, fineness);
+    let films = layer_films(&division, gap, FIRST_FINENESS);
     let first_energy = energy(&films.complex, &films.places);
-    let cells = division.seeds.len();
-    let wanted = IndexVec::from_elem(1.0 / as_f64(cells), cells);
-    // The mean curvature of films this size is of the order of one over the spacing; equal cells have equal pressures.
-    let pressures = IndexVec::from_elem(0.0, cells);
-    let mut descent = Descent::new(films.complex, wanted, films.places, pressures)?;
-    let settings =
-        DescentSettings { length: spacing, tolerance, volume_tolerance: 1e-11, step_limit: STEP_LIMIT };
-    let borders = films.borders;
-    let descended = descent.descend(&settings, &mut |told: &DescentStep<'_>| {
-        let shortest =
-            lengths(&borders, told.descent).map(|(_, length)| length).fold(f64::INFINITY, f64::min);
-        if shortest < VANISHED * spacing { ControlFlow::Break(()) } else { progress(told) }
-    })?;
-    let vanishing = if descended.ending == Ending::Converged {
-        Vec::new()
-    } else {
-        lengths(&borders, &descent).filter(|(_, length)| *length < VANISHING * spacing).collect()
-    };
-    Ok(Layers {
+    let mut run = Run {
+        gap,
+        settings,
+        fineness: FIRST_FINENESS,
         division,
-        first_energy,
-        energy: descent.energy(),
-        pressures: descent.pressures().clone(),
-        volumes: descent.volumes(),
-        descended,
-        vanishing,
-        films: LayerFilms { complex: descent.complex().clone(), places: descent.places().clone(), borders },
-    })
+        films,
+        weary: BTreeMap::new(),
+        flips: 0,
+        spreads: 0,
+    };
+    let mut pressures = IndexVec::from_elem(0.0, run.division.seeds.len());
+    let mut steps = 0;
+    loop {
+        let mut descent = run.descent(pressures)?;
+        let (descended, shrinking) = run.descend(&mut descent, settings.step_limit - steps, progress)?;
+        let stuck = shrinking.stuck || descended.ending == Ending::Stalled;
+        steps += descended.steps;
+        run.keep(&descent);
+        pressures = descent.pressures().clone();
+        let asked_to_stop =
+            descended.ending == Ending::Halted && shrinking.sides.is_empty() && !shrinking.stuck;
+        let goes_on = !asked_to_stop && steps < settings.step_limit;
+        let flipped = goes_on && !shrinking.sides.is_empty() && run.flip(&shrinking);
+        let spread = goes_on && !flipped && stuck && run.spread();
+        if !flipped && !spread && !(goes_on && !stuck && run.refine()) {
+            let descended = Descended { steps, ..descended };
+            return Ok(run.end(&descent, descended, first_energy));
+        }
+    }
 }
 
-/// The lengths of the chords of borders.
-fn lengths<'a>(
-    borders: &'a BTreeMap<Side, Vec<NodeImage>>,
-    descent: &'a Descent,
-) -> impl Iterator<Item = (Side, f64)> + 'a {
-    borders.iter().map(|(&side, nodes)| {
+/// A foam on its way.
+struct Run<'a> {
+    gap: &'a Gap,
+    settings: &'a LayerSettings,
+    /// That of the present films.
+    fineness: usize,
+    division: Division,
+    films: LayerFilms,
+    /// How often bodies have changed neighbours.
+    weary: BTreeMap<Cluster, u32>,
+    flips: usize,
+    /// How often films were laid anew.
+    spreads: usize,
+}
+
+/// Sides that can change the topology, the shortest first.
+#[derive(Default)]
+struct Vanishing {
+    sides: Vec<Side>,
+    /// The longest side of a film that may become a border.
+    small: f64,
+    /// Whether steps are held up although nothing vanishes.
+    stuck: bool,
+}
+
+/// Changes of topology for each cell, after which no more are made: a foam that needs as many goes round in circles.
+const MOST_FLIPS: usize = 10;
+
+/// Lengths of all borders and edges on walls.
+type Lengths = BTreeMap<Side, f64>;
+
+impl Run<'_> {
+    fn descent(&self, pressures: IndexVec<RegionId, f64>) -> Result<Descent, NoLayers> {
+        let cells = self.division.seeds.len();
+        let wanted = IndexVec::from_elem(1.0 / as_f64(cells), cells);
+        Ok(Descent::new(self.films.complex.clone(), wanted, self.films.places.clone(), pressures)?)
+    }
+
+    /// Descends until the end or until borders vanish that can; these are given, the shortest first.
+    fn descend(
+        &self,
+        descent: &mut Descent,
+        step_limit: usize,
+        progress: &mut dyn FnMut(&DescentStep<'_>) -> ControlFlow<()>,
+    ) -> Result<(Descended, Vanishing), NoLayers> {
+        let LayerSettings { spacing, tolerance, .. } = *self.settings;
+        let tolerance = if self.fineness < self.settings.fineness { FIRST_TOLERANCE } else { tolerance };
+        let settings = DescentSettings { length: spacing, tolerance, volume_tolerance: 1e-11, step_limit };
+        let mut before = self.lengths(descent);
+        let mut shrinking = Vanishing::default();
+        let mut held_up = 0;
+        let descended = descent.descend(&settings, &mut |told: &DescentStep<'_>| {
+            let now = self.lengths(told.descent);
+            shrinking = self.vanishing(&before, &now, told);
+            before = now;
+            held_up = if told.fraction < HELD_UP { held_up + 1 } else { 0 };
+            shrinking.stuck = held_up >= MOST_HELD_UP && self.spreads < MOST_SPREADS;
+            let flow = progress(told);
+            if shrinking.sides.is_empty() && !shrinking.stuck { flow } else { ControlFlow::Break(()) }
+        })?;
+        Ok((descended, shrinking))
+    }
+
+    fn lengths(&self, descent: &Descent) -> Lengths {
         let place = |image: &NodeImage| descent.complex().place(descent.places(), *image);
-        let length = nodes.windows(2).map(|pair| place(&pair[0]).distance(place(&pair[1]))).sum();
-        (side, length)
-    })
+        let sides = self.films.borders.iter().chain(&self.films.wall_edges);
+        sides
+            .map(|(&side, nodes)| {
+                (side, nodes.windows(2).map(|pair| place(&pair[0]).distance(place(&pair[1]))).sum())
+            })
+            .collect()
+    }
+
+    /// Sides that are short, grow shorter and can change the topology.
+    fn vanishing(&self, before: &Lengths, now: &Lengths, told: &DescentStep<'_>) -> Vanishing {
+        let held_up = told.fraction < HELD_UP;
+        let factor = if held_up { HELD_UP_BY } else { 1.0 };
+        let (limit, small) =
+            (factor * VANISHING * self.settings.spacing, factor * SMALL_FILM * self.settings.spacing);
+        let short = |side: &Side, length: f64| length < limit && (held_up || length < before[side]);
+        let exhausted = self.flips >= MOST_FLIPS * self.division.seeds.len();
+        if exhausted || !now.iter().any(|(side, &length)| short(side, length)) {
+            return Vanishing::default();
+        }
+        let division = self.division_at(told.descent.places());
+        let moves = Moves::new(&division, self.gap, self.settings.spacing);
+        let mut found: Vec<(f64, Side)> = now
+            .iter()
+            .filter(|&(side, &length)| short(side, length))
+            .filter_map(|(&side, &length)| {
+                let times = self.weary.get(&moves.cluster(side)?).copied().unwrap_or(0);
+                let relative = length / (limit * WEARINESS.powi(i32::try_from(times).unwrap_or(i32::MAX)));
+                (relative < 1.0 && moves.can_vanish(side, small)).then_some((relative, side))
+            })
+            .collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        Vanishing { sides: found.into_iter().map(|(_, side)| side).collect(), small, stuck: false }
+    }
+
+    /// Takes over where a descent has brought the nodes.
+    fn keep(&mut self, descent: &Descent) {
+        self.films.places = descent.places().clone();
+        self.division = self.division_at(descent.places());
+    }
+
+    /// The division with its corners where their nodes are.
+    fn division_at(&self, places: &Places) -> Division {
+        let mut division = self.division.clone();
+        for (at, corner) in division.corners.iter_mut().enumerate() {
+            corner.place = places[NodeId::from_index(at)];
+        }
+        division
+    }
+
+    /// Changes the topology at these sides, as far as they do not disturb each other. Gives whether anything changed.
+    fn flip(&mut self, vanishing: &Vanishing) -> bool {
+        let mut moves = Moves::new(&self.division, self.gap, self.settings.spacing);
+        let mut touched: BTreeSet<usize> = BTreeSet::new();
+        let mut done = 0;
+        for &side in &vanishing.sides {
+            let round: BTreeSet<usize> =
+                [side.0, side.1].into_iter().flat_map(|corner| moves.neighbourhood(corner)).collect();
+            if round.iter().any(|corner| touched.contains(corner)) {
+                continue;
+            }
+            let Some(cluster) = moves.vanish(side, vanishing.small) else { continue };
+            *self.weary.entry(cluster).or_default() += 1;
+            touched.extend(round);
+            done += 1;
+        }
+        if done > 0 {
+            let (division, renumbering) = moves.finish();
+            self.films = films_after(&division, self.gap, self.fineness, &self.films, &renumbering);
+            self.division = division;
+            self.flips += done;
+        }
+        done > 0
+    }
+
+    /// Lays the films anew between their corners, every other time between their borders: elements that are about to fold open.
+    /// Gives whether this may help yet.
+    fn spread(&mut self) -> bool {
+        self.spreads += 1;
+        self.films = if self.spreads.is_multiple_of(2) {
+            films_refined(&self.division, self.gap, self.fineness, &self.films)
+        } else {
+            layer_films(&self.division, self.gap, self.fineness)
+        };
+        self.spreads <= MOST_SPREADS
+    }
+
+    /// Goes on to the films that were asked for. Gives whether there are others to go on to.
+    fn refine(&mut self) -> bool {
+        let coarser = self.fineness < self.settings.fineness;
+        if coarser {
+            self.fineness = self.settings.fineness;
+            self.films = films_refined(&self.division, self.gap, self.fineness, &self.films);
+        }
+        coarser
+    }
+
+    fn end(self, descent: &Descent, descended: Descended, first_energy: f64) -> Layers {
+        let vanishing = if descended.ending == Ending::Converged {
+            Vec::new()
+        } else {
+            let lengths = self.lengths(descent);
+            lengths.into_iter().filter(|(_, length)| *length < VANISHING * self.settings.spacing).collect()
+        };
+        Layers {
+            first_energy,
+            energy: descent.energy(),
+            pressures: descent.pressures().clone(),
+            volumes: descent.volumes(),
+            descended,
+            flips: self.flips,
+            vanishing,
+            division: self.division,
+            films: self.films,
+        }
+    }
 }
 
 impl Layers {

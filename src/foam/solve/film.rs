@@ -11,13 +11,15 @@ use crate::foam::{
 };
 use crate::index::IndexVec;
 use faer::{
-    Accum, Mat, MatMut, MatRef, Par, Spec,
+    Accum, Mat, MatMut, MatRef, Par, Side, Spec,
     dyn_stack::{MemBuffer, MemStack},
     linalg::{
         cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch},
         matmul::matmul,
+        solvers::Lblt,
         triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place},
     },
+    prelude::Solve,
 };
 use glam::{DMat3, DVec3};
 
@@ -46,8 +48,10 @@ pub(super) struct FilmHessian {
 pub(super) struct FilmSystem {
     /// Over the film's unknowns (freedoms, then the two pressures): the condensed matrix.
     pub(super) matrix: Mat<f64>,
-    /// Whether the inner block had to be stiffened to be positive definite.
-    pub(super) stiffened: bool,
+    /// The negative eigenvalues of the inner block. A film that bends by more than half a turn has one between fixed borders
+    /// at fixed pressures; the inertia of the whole system is that of the inner blocks and of what is left when they are
+    /// condensed (E. V. Haynsworth, "Determination of the inertia of a partitioned Hermitian matrix", 1968).
+    pub(super) negative: usize,
     factor: Option<Factor>,
     /// Inner rows of the matrix before condensation.
     coupling: Mat<f64>,
@@ -249,53 +253,77 @@ pub(super) fn condense(layout: &FilmLayout, film: &FilmHessian, shift: f64) -> F
             coupling[(i, outer + side)] = volume[(outer + i, 0)];
         }
     }
-    let (factor, stiffened) = positive_factor(hessian.submatrix(outer, outer, inner, inner), shift);
+    let mut block = hessian.submatrix(outer, outer, inner, inner).to_owned();
+    for i in 0..inner {
+        block[(i, i)] += shift;
+    }
     let mut answer = coupling.clone();
+    let (factor, negative) = match Factor::new(&block) {
+        Some((factor, negative)) if inner > 0 => (Some(factor), negative),
+        Some(_) => (None, 0),
+        None => (None, inner),
+    };
     if let Some(factor) = &factor {
         factor.solve_in_place(answer.as_mut());
         matmul(matrix.as_mut(), Accum::Add, coupling.transpose(), answer.as_ref(), -1.0, Par::Seq);
     }
-    FilmSystem { matrix, stiffened, factor, coupling, answer }
+    FilmSystem { matrix, negative, factor, coupling, answer }
 }
 
-/// A dense Cholesky factor, its upper triangle undefined. Films are many and small: threads work on films, never within one.
-struct Factor(Mat<f64>);
+/// A dense factor. Films are many and small: threads work on films, never within one.
+enum Factor {
+    /// Of a positive definite matrix: Cholesky's, its upper triangle undefined.
+    Positive(Mat<f64>),
+    /// Of any other: with pivots.
+    Pivoted(Lblt<f64>),
+}
 
 impl Factor {
-    fn new(mut matrix: Mat<f64>) -> Option<Self> {
+    /// The factor, and how many negative eigenvalues the matrix has; nothing for a matrix that is not one of numbers.
+    fn new(matrix: &Mat<f64>) -> Option<(Self, usize)> {
         let size = matrix.nrows();
         let mut memory =
             MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Spec::default())).ok()?;
         let stack = MemStack::new(&mut memory);
-        cholesky_in_place(matrix.as_mut(), Default::default(), Par::Seq, stack, Spec::default()).ok()?;
-        Some(Self(matrix))
+        let mut positive = matrix.clone();
+        if cholesky_in_place(positive.as_mut(), Default::default(), Par::Seq, stack, Spec::default()).is_ok()
+        {
+            return Some((Self::Positive(positive), 0));
+        }
+        if (0..size).any(|i| (0..size).any(|j| !matrix[(i, j)].is_finite())) {
+            return None;
+        }
+        let pivoted = Lblt::new(matrix.as_ref(), Side::Lower);
+        let negative = negative_eigenvalues(&pivoted);
+        Some((Self::Pivoted(pivoted), negative))
     }
 
     fn solve_in_place(&self, mut rhs: MatMut<'_, f64>) {
-        solve_lower_triangular_in_place(self.0.as_ref(), rhs.as_mut(), Par::Seq);
-        solve_upper_triangular_in_place(self.0.transpose(), rhs, Par::Seq);
+        match self {
+            Self::Positive(factor) => {
+                solve_lower_triangular_in_place(factor.as_ref(), rhs.as_mut(), Par::Seq);
+                solve_upper_triangular_in_place(factor.transpose(), rhs, Par::Seq);
+            }
+            Self::Pivoted(factor) => factor.solve_in_place(rhs),
+        }
     }
 }
 
-/// Tenfold stiffenings tried before a film's inner block counts as hopeless.
-const STIFFENINGS: i32 = 12;
-
-/// The Cholesky factor of the inner block with `shift` on its diagonal, stiffened further until it is positive definite.
-fn positive_factor(block: MatRef<'_, f64>, shift: f64) -> (Option<Factor>, bool) {
-    let inner = block.nrows();
-    if inner == 0 {
-        return (None, false);
-    }
-    let scale = (0..inner).map(|i| block[(i, i)].abs()).fold(0.0, f64::max);
-    for attempt in -1..STIFFENINGS {
-        let extra = if attempt < 0 { 0.0 } else { scale * 1e-4 * 10_f64.powi(attempt) };
-        let mut stiff = block.to_owned();
-        for i in 0..inner {
-            stiff[(i, i)] += shift + extra;
-        }
-        if let Some(factor) = Factor::new(stiff) {
-            return (Some(factor), attempt >= 0);
+/// The negative eigenvalues of a matrix: by Sylvester's law as many as its block-diagonal factor has.
+pub(in crate::foam) fn negative_eigenvalues(factor: &Lblt<f64>) -> usize {
+    let (diagonal, below) = (factor.B_diag().column_vector(), factor.B_subdiag().column_vector());
+    let mut count = 0;
+    let mut at = 0;
+    while at < diagonal.nrows() {
+        if at + 1 < diagonal.nrows() && below[at].abs() > 0.0 {
+            let (sum, product) =
+                (diagonal[at] + diagonal[at + 1], diagonal[at] * diagonal[at + 1] - below[at] * below[at]);
+            count += if product < 0.0 { 1 } else { 2 * usize::from(sum < 0.0) };
+            at += 2;
+        } else {
+            count += usize::from(diagonal[at] < 0.0);
+            at += 1;
         }
     }
-    (None, true)
+    count
 }

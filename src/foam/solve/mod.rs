@@ -25,6 +25,7 @@ use super::{
     volume::{Reference, volumes},
 };
 use crate::index::IndexVec;
+pub(in crate::foam) use film::negative_eigenvalues;
 use film::{At, FilmHessian, FilmSystem};
 use glam::DVec3;
 use layout::{Layout, lower_pairs};
@@ -258,9 +259,10 @@ impl System {
             let softening = self.softening(&films);
             let entries = self.entries(&films, walls, shift);
             let factored = Factored::new(&self.layout, &self.symbolic, entries, &softening);
-            let extra = factored.as_ref().map_or(1, |f| f.negative.saturating_sub(self.layout.pressures));
-            let stiffened = films.iter().filter(|film| film.stiffened).count();
-            unstable.get_or_insert(extra + stiffened);
+            let inner: usize = films.iter().map(|film| film.negative).sum();
+            let extra =
+                factored.as_ref().map_or(1, |f| (f.negative + inner).saturating_sub(self.layout.pressures));
+            unstable.get_or_insert(extra);
             // A Hessian that is just positive gives steps as wild as one that is not: one stiffening more.
             let sound = extra == 0 && (attempt == 0 || std::mem::replace(&mut stiff, true));
             if let Ok(factored) = factored
