@@ -190,3 +190,42 @@ impl<'a> Neighbours<'a> {
         (energy, force - normal * force.dot(normal))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        foam::{domain::Domain, ground::Density},
+        surface::{Gap, SchwarzP},
+        units::LevelOffset,
+    };
+    use rand::{RngExt, SeedableRng};
+    use std::sync::Arc;
+
+    #[test]
+    fn kept_neighbours_give_the_forces_of_new_ones() {
+        let Ok(gap) = Gap::level_set(Arc::new(SchwarzP { period: 1.0 }), LevelOffset(0.2)) else {
+            panic!("no gap")
+        };
+        let domain = Domain::of_surface(gap.middle().as_ref());
+        let ground = Ground::new(&gap, &domain, Density::Gap);
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut points: Vec<DVec3> = (0..40).filter_map(|_| ground.sample(40.0, &mut rng)).collect();
+        let mut kept = Neighbours::new(&ground, &points, 2.0);
+        let step = 0.03 * ground.mean_spacing(40.0);
+        // Far enough for several lists, and for seeds that leave the box.
+        for _ in 0..60 {
+            let pushes =
+                points.iter().map(|_| DVec3::from_array(rng.random::<[f64; 3]>()) * 2.0 - DVec3::splat(0.7));
+            let pushes: Vec<DVec3> = pushes.collect();
+            points = displaced(&ground, &points, &pushes, step);
+            let (old, new) =
+                (kept.repulsion(&points), Neighbours::new(&ground, &points, 2.0).repulsion(&points));
+            // Sums of some ten terms in another order.
+            assert!((old.energy / new.energy - 1.0).abs() < 1e-12, "{} {}", old.energy, new.energy);
+            for (a, b) in old.forces.iter().zip(&new.forces) {
+                assert!(a.distance(*b) <= 1e-10 * (1.0 + b.length()), "{a} {b}");
+            }
+        }
+    }
+}
