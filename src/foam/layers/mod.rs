@@ -14,8 +14,9 @@
 //! | side counts; angles at corners | `figures.rs` |
 //! | how the defects of the two layers sit to each other | `companions.rs` |
 //!
-//! Not promised: a cell stays in its layer. Where it would reach the other wall, or leave its own, the descent ends and says
-//! so; nor do corners where more than four cells meet, as in the bees' arrangement, change.
+//! Not promised: balance. A change that would take a cell to the other wall, away from its own, or to a second film with a
+//! neighbour is not made, nor one at corners where more than four cells meet, as in the bees' arrangement; a foam that needs it
+//! ends as stalled, with the borders that vanish. Few cells on a sphere do, and layers much flatter than a cell is wide.
 //!
 //! Sources: L. Fejes Tóth, "What the bees know and what they do not know", Bull. Amer. Math. Soc. 70 (1964); D. Weaire and
 //! R. Phelan, "Optimal design of honeycombs", Nature 367 (1994), who made both arrangements in foam between glass plates.
