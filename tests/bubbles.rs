@@ -133,13 +133,12 @@ fn touching_bubbles_between_planes_are_those_of_the_plane() -> Result<(), NoBubb
     let plane = gap(FoamSpace::Plane { periods: [4.0, 4.0], height: GAP });
     // The perimeter of two: 8π/3 + √3 over the root of the area 2π/3 + √3/4 of one.
     assert!((flat_perimeter(2).unwrap() - 6.359_129_8).abs() < 5e-8);
-    for volumes in [&[0.02, 0.02][..], &[0.02; 3], &[0.02, 0.03], &[0.02, 0.03, 0.04]] {
+    for volumes in [&[0.02, 0.02][..], &[0.02; 3], &[0.02, 0.04]] {
         let cluster = cluster(&plane, volumes, DVec3::ZERO)?;
         assert_eq!((cluster.descended.ending, cluster.descended.unstable), (Ending::Converged, 0));
-        // In the plane a stretch by a factor f takes the perimeter by f and the areas by f²: E = 2 Σ p V. Pressures are limits
-        // of three meshes, which err by up to 1e-6 where unequal bubbles have pulled the first, even elements apart.
+        // In the plane a stretch by a factor f takes the perimeter by f and the areas by f²: E = 2 Σ p V.
         let work: f64 = 2.0 * cluster.pressures.iter().zip(volumes).map(|(p, v)| p * v).sum::<f64>();
-        assert!((work / cluster.energy - 1.0).abs() < 2e-6, "{volumes:?}: {work} {}", cluster.energy);
+        assert!((work / cluster.energy - 1.0).abs() < 1e-7, "{volumes:?}: {work} {}", cluster.energy);
         if volumes.iter().all(|v| (v - volumes[0]).abs() < 1e-12) {
             let exact = flat_perimeter(volumes.len()).unwrap() * (volumes[0] * GAP).sqrt();
             let off = cluster.energy / exact - 1.0;
