@@ -17,38 +17,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::{Duration, Instant};
 
-const CUBE: &str = "vertices
-1 0 0 0
-2 1 0 0
-3 1 1 0
-4 0 1 0
-5 0 0 1
-6 1 0 1
-7 1 1 1
-8 0 1 1
-edges
-1 1 2
-2 2 3
-3 3 4
-4 4 1
-5 5 6
-6 6 7
-7 7 8
-8 8 5
-9 1 5
-10 2 6
-11 3 7
-12 4 8
-faces
-1 1 10 -5 -9
-2 2 11 -6 -10
-3 3 12 -7 -11
-4 4 9 -8 -12
-5 5 6 7 8
-6 -4 -3 -2 -1
-bodies
-1 1 2 3 4 5 6 volume 1
-";
+const CUBE: &str = include_str!("../tests/support/cube.fe");
 
 struct Silent;
 

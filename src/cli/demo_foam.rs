@@ -91,6 +91,8 @@ fn settings(space: FoamSpace, seeds: SeedSettings) -> FoamSettings {
         relax: RelaxSettings::default(),
         last_stage: Stage::Foam,
         runs: 1,
+        anneal: 0,
+        extrapolate: false,
         jobs: None,
         write_fe: None,
         output: PathBuf::new(),

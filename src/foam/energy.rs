@@ -31,6 +31,20 @@ impl Blocks {
         Self { size: 3 * nodes, values: vec![0.0; 9 * nodes * nodes] }
     }
 
+    /// Makes it zero, for an element of so many nodes.
+    pub(crate) fn restart(&mut self, nodes: usize) {
+        self.size = 3 * nodes;
+        self.values.clear();
+        self.values.resize(9 * nodes * nodes, 0.0);
+    }
+
+    /// The block of a row and a column of nodes.
+    pub(crate) fn block(&self, row: usize, column: usize) -> DMat3 {
+        let start = |c: usize| (3 * column + c) * self.size + 3 * row;
+        let own = |c: usize| DVec3::from_slice(&self.values[start(c)..start(c) + 3]);
+        DMat3::from_cols(own(0), own(1), own(2))
+    }
+
     pub(crate) fn add(&mut self, row: usize, column: usize, block: DMat3) {
         for (c, values) in [block.x_axis, block.y_axis, block.z_axis].into_iter().enumerate() {
             let at = (3 * column + c) * self.size + 3 * row;

@@ -12,7 +12,7 @@ use crate::evolver::{
 type Parsed = Result<Action, EvolverError>;
 
 /// Switches; those that change nothing here are known by name only.
-const TOGGLES: [&str; 46] = [
+const TOGGLES: [&str; 45] = [
     "quiet",
     "gravity",
     "conj_grad",
@@ -58,7 +58,6 @@ const TOGGLES: [&str; 46] = [
     "big_endian",
     "little_endian",
     "verbose",
-    "convert_to_quantities",
 ];
 
 /// Commands of the display: there is none here.
@@ -78,7 +77,7 @@ const DISPLAY: [&str; 12] = [
 ];
 
 /// Commands of Surface Evolver that are not supported, with the nearest way to do it.
-const REFUSED: [(&str, &str); 36] = [
+const REFUSED: [(&str, &str); 35] = [
     ("lagrange", "quadratic elements are supported: quadratic"),
     ("addload", "put all elements into one datafile"),
     ("load", "run another datafile: combwright evolver run FILE"),
@@ -89,7 +88,6 @@ const REFUSED: [(&str, &str); 36] = [
     ("exec", ""),
     ("chdir", ""),
     ("burchard", "use hessian_seek"),
-    ("convert_to_quantities", ""),
     ("vertex_merge", ""),
     ("edge_merge", ""),
     ("facet_merge", ""),
@@ -233,6 +231,7 @@ fn plain_command(cursor: &mut Cursor, word: &str) -> Option<Parsed> {
         "linear" => return simple(Simple::Linear),
         "quadratic" => return simple(Simple::Quadratic),
         "recalc" => return simple(Simple::Recalculate),
+        "convert_to_quantities" => return simple(Simple::Quantities),
         "quit" | "exit" | "bye" => return simple(Simple::Quit),
         "help" => return simple(Simple::Help),
         "counts" => return simple(Simple::Counts),
@@ -242,6 +241,7 @@ fn plain_command(cursor: &mut Cursor, word: &str) -> Option<Parsed> {
         "hessian_seek" => optional_number(cursor).map(|n| Action::Numeric(Numeric::HessianSeek, n)),
         "saddle" => optional_number(cursor).map(|n| Action::Numeric(Numeric::Saddle, n)),
         "eigenprobe" => optional_number(cursor).map(|n| Action::Numeric(Numeric::Eigenprobe, n)),
+        "slide" => optional_number(cursor).map(|n| Action::Numeric(Numeric::Slide, n)),
         "ritz" => ritz(cursor),
         "print" => cursor.expression().map(Action::Print),
         "printf" | "errprintf" => printf(cursor),

@@ -109,6 +109,8 @@ pub enum Simple {
     Quadratic,
     /// `recalc`
     Recalculate,
+    /// `convert_to_quantities`
+    Quantities,
     /// `X`, `z`, `i`: information.
     Information,
     /// `q`, `quit`
@@ -150,6 +152,8 @@ pub enum Numeric {
     Saddle,
     /// `eigenprobe`
     Eigenprobe,
+    /// `slide`: of this program only.
+    Slide,
     /// `n`: notching.
     Notch,
 }

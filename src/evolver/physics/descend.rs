@@ -7,14 +7,15 @@
 use super::{
     freedom::State,
     gradient::{Gradients, Slots},
-    problem::{FunctionalId, Problem, Values},
+    problem::{FunctionalId, Measured, Problem, Values},
 };
 use crate::{
     evolver::{error::EvolverError, surface::VertexId},
-    foam::solve::symmetric::SymmetricPattern,
+    foam::solve::symmetric::{SymmetricFactor, SymmetricPattern},
     index::{Id, IndexVec, checked_u32},
 };
 use glam::DVec3;
+use std::sync::Arc;
 
 /// The scale of `g`, and the memory of conjugate gradients.
 #[derive(Clone, Debug)]
@@ -56,7 +57,8 @@ pub(crate) struct Descended {
     pub(crate) base: f64,
 }
 
-/// The sum of the functionals' errors at which restoring stops: Surface Evolver's, absolute as there.
+/// The sum of the functionals' errors at which restoring stops: Surface Evolver's, so that both stop at the same place. It
+/// is absolute for volumes and relative to the absolute shares for quantities, and for volumes once they count as quantities.
 const TARGET_TOLERANCE: f64 = 1e-4;
 /// Restoring steps before giving up.
 const RESTORATIONS: usize = 10;
@@ -68,77 +70,85 @@ pub(crate) struct Restoring {
     velocities: Slots,
     held: Vec<FunctionalId>,
     row: IndexVec<FunctionalId, Option<u32>>,
-    entries: Vec<(u32, u32)>,
-    values: Vec<f64>,
+    products: Products,
+}
+
+/// The products of the functionals' gradients, ready to solve for combinations.
+enum Products {
+    /// Of none or one functional.
+    Single(f64),
+    Many(SymmetricFactor),
+}
+
+fn singular(error: crate::foam::solve::FactorError) -> EvolverError {
+    EvolverError::Numerical(format!("the fixed volumes and quantities cannot be held: {error}"))
+}
+
+impl Products {
+    /// From entries of the lower triangle, which may repeat.
+    fn new(size: usize, mut entries: Vec<(u32, u32)>, mut values: Vec<f64>) -> Result<Self, EvolverError> {
+        if size <= 1 {
+            return Ok(Self::Single(values.iter().sum()));
+        }
+        let mut diagonal = vec![0.0; size];
+        for (&(row, column), value) in entries.iter().zip(&values) {
+            if row == column {
+                diagonal[row as usize] += value;
+            }
+        }
+        // A volume that nothing can change, or that follows from others, must not make the matrix singular.
+        let most = diagonal.iter().fold(f64::MIN_POSITIVE, |most, &value| most.max(value));
+        for at in 0..checked_u32(size) {
+            entries.push((at, at));
+            values.push(STIFFENING * most);
+        }
+        let pattern = Arc::new(SymmetricPattern::new(size, entries).map_err(singular)?);
+        pattern.factor(&values).map(Self::Many).map_err(singular)
+    }
 }
 
 impl Restoring {
-    pub(crate) fn new(problem: &Problem, state: &State, slots: &Slots) -> Self {
+    /// From the gradients of the functionals.
+    ///
+    /// # Errors
+    /// [`EvolverError::Numerical`] if they depend on each other.
+    pub(crate) fn new(problem: &Problem, state: &State, slots: &Slots) -> Result<Self, EvolverError> {
         let held = problem.held();
         let mut row = IndexVec::from_elem(None, problem.functionals().len());
         for (at, &id) in held.iter().enumerate() {
             row[id] = Some(checked_u32(at));
         }
         let mut velocities = slots.clone();
-        let size = held.len();
-        let mut dense = if size <= DENSE { vec![0.0; size * size] } else { Vec::new() };
-        let mut sparse: std::collections::BTreeMap<(u32, u32), f64> = std::collections::BTreeMap::new();
+        let (mut entries, mut values) = (Vec::new(), Vec::new());
         for vertex in problem.holds.ids() {
             let range = velocities.range(vertex.index());
-            if range.is_empty() {
-                continue;
-            }
-            for slot in range.clone() {
+            for slot in range {
                 velocities.values[slot] = problem.projected(state, vertex, slots.values[slot]);
             }
-            let own: Vec<(FunctionalId, DVec3)> = velocities.at(vertex).collect();
-            let raw: Vec<(FunctionalId, DVec3)> = slots.at(vertex).collect();
-            for (i, (a, gradient)) in raw.iter().enumerate() {
+            let on_boundary = problem.moves_on_boundary(vertex);
+            for ((a, raw), (_, own)) in slots.at(vertex).zip(velocities.at(vertex)) {
                 // On a boundary both must be velocities of parameters.
-                let gradient = if problem.moves_on_boundary(vertex) { own[i].1 } else { *gradient };
-                for (b, velocity) in &own {
-                    if let (Some(r), Some(c)) = (row[*a], row[*b])
+                let gradient = if on_boundary { own } else { raw };
+                for (b, velocity) in velocities.at(vertex) {
+                    if let (Some(r), Some(c)) = (row[a], row[b])
                         && r >= c
                     {
-                        let value = gradient.dot(*velocity);
-                        if size <= DENSE {
-                            dense[r as usize * size + c as usize] += value;
-                        } else {
-                            *sparse.entry((r, c)).or_insert(0.0) += value;
-                        }
+                        entries.push((r, c));
+                        values.push(gradient.dot(velocity));
                     }
                 }
             }
         }
-        for r in 0..dense.len().min(size * size) {
-            let (r, c) = (r / size, r % size);
-            if r >= c {
-                sparse.insert((checked_u32(r), checked_u32(c)), dense[r * size + c]);
-            }
-        }
-        // A volume that nothing can change, or that follows from others, must not make the matrix singular.
-        let most = sparse.iter().filter(|((r, c), _)| r == c).fold(0.0, |most: f64, (_, v)| most.max(*v));
-        for at in 0..size {
-            *sparse.entry((checked_u32(at), checked_u32(at))).or_insert(0.0) +=
-                STIFFENING * most.max(f64::MIN_POSITIVE);
-        }
-        let (entries, values) = sparse.into_iter().unzip();
-        Self { velocities, held, row, entries, values }
+        let products = Products::new(held.len(), entries, values)?;
+        Ok(Self { velocities, held, row, products })
     }
 
     /// The combination whose motion changes the functionals by `wanted`.
     fn combination(&self, wanted: &[f64]) -> Result<Vec<f64>, EvolverError> {
-        if wanted.is_empty() {
-            return Ok(Vec::new());
+        match &self.products {
+            Products::Single(product) => Ok(wanted.iter().map(|wanted| wanted / product).collect()),
+            Products::Many(factor) => factor.solve(wanted).map_err(singular),
         }
-        if let ([value], [wanted]) = (&self.values[..], wanted) {
-            return Ok(vec![wanted / value]);
-        }
-        let singular = |error: crate::foam::solve::FactorError| {
-            EvolverError::Numerical(format!("the fixed volumes and quantities cannot be held: {error}"))
-        };
-        let pattern = SymmetricPattern::new(self.held.len(), &self.entries).map_err(singular)?;
-        pattern.factor(&self.values).and_then(|factor| factor.solve(wanted)).map_err(singular)
     }
 
     /// What is missing from the targets, and the sum of the errors in units of the tolerance.
@@ -150,7 +160,10 @@ impl Restoring {
             .map(|&id| {
                 let target = problem.functionals()[id].target.unwrap_or(0.0);
                 let missing = target - values.functionals[id];
-                error += missing.abs() / TARGET_TOLERANCE;
+                let magnitude = values.magnitudes[id];
+                let is_quantity = matches!(problem.functionals()[id].measured, Measured::Quantity(_));
+                let unit = if (problem.relative || is_quantity) && magnitude > 0.0 { magnitude } else { 1.0 };
+                error += missing.abs() / (TARGET_TOLERANCE * unit);
                 missing
             })
             .collect();
@@ -196,7 +209,7 @@ impl Restoring {
             if error > 0.5 * before && step + 1 < RESTORATIONS {
                 // No good progress: the gradients are old.
                 let slots = problem.gradients(&state.places, problem.slots()).functionals;
-                fresh = Some(Self::new(problem, state, &slots));
+                fresh = Some(Self::new(problem, state, &slots)?);
             }
         }
         Ok(values)
@@ -205,9 +218,6 @@ impl Restoring {
 
 /// The force on each vertex, and the multiplier of each functional.
 type Forces = (IndexVec<VertexId, DVec3>, IndexVec<FunctionalId, f64>);
-
-/// Up to this many functionals products are summed in a full matrix, which is faster to fill.
-const DENSE: usize = 64;
 
 /// What is added to the diagonal of the functionals' products, relative to the largest.
 const STIFFENING: f64 = 1e-13;
@@ -264,7 +274,7 @@ impl Problem {
             let downhill = gradients.energy.iter().map(|g| -*g).collect();
             self.release(state, &downhill);
         }
-        let restoring = Restoring::new(self, state, &gradients.functionals);
+        let restoring = Restoring::new(self, state, &gradients.functionals)?;
         let (force, multipliers) = self.force(state, &gradients, &restoring)?;
         let direction = descent.direction(force);
         let trial = Trial { problem: self, state, direction: &direction, restoring: &restoring };

@@ -90,6 +90,13 @@ impl FacetField {
         gradient: &mut [DVec3],
         mut hessian: Option<&mut Blocks>,
     ) {
+        match (self, nodes) {
+            (Self::Area, &[a, b, c]) => return add_flat_area(factor, [a, b, c], gradient, hessian),
+            (Self::Flux(VectorField::Height), &[a, b, c]) => {
+                return add_flat_height(factor, [a, b, c], gradient, hessian);
+            }
+            _ => {}
+        }
         let shape = shape_of(nodes.len());
         let count = nodes.len();
         if let Self::Area = self {
@@ -114,6 +121,68 @@ impl FacetField {
             if let (Some(hessian), Some(second)) = (hessian.as_deref_mut(), &parts.second) {
                 scatter(point, weight, count, second, hessian);
             }
+        }
+    }
+}
+
+/// Adds the derivatives of the area of a flat triangle, `|n|/2` with `n` the product of two sides:
+/// `∂|n|/∂xᵢ = sᵢ × u` with `sᵢ` the side opposite to a corner and `u = n/|n|`.
+fn add_flat_area(factor: f64, nodes: [DVec3; 3], gradient: &mut [DVec3], hessian: Option<&mut Blocks>) {
+    let [a, b, c] = nodes;
+    let n = (b - a).cross(c - a);
+    let length = n.length();
+    let unit = n / length;
+    let sides = [c - b, a - c, b - a];
+    let half = 0.5 * factor;
+    for (out, side) in gradient.iter_mut().zip(sides) {
+        *out += half * unit.cross(side);
+    }
+    let Some(hessian) = hessian else { return };
+    let flat = (half / length) * (DMat3::IDENTITY - outer(unit, unit));
+    // By corner, ∂n/∂xᵢ = [sᵢ]ₓ up to sign; the product of two sides bends n itself between different corners.
+    let turns = sides.map(|side| cross_matrix(side));
+    let bend = half * cross_matrix(unit);
+    for i in 0..3 {
+        let left = turns[i].transpose() * flat;
+        for j in 0..3 {
+            let both = left * turns[j];
+            hessian.add(
+                i,
+                j,
+                match (3 + j - i) % 3 {
+                    0 => both,
+                    1 => both - bend,
+                    _ => both + bend,
+                },
+            );
+        }
+    }
+}
+
+/// Adds the derivatives of the volume below a flat triangle, `n_z z̄/2` with the mean height `z̄`.
+fn add_flat_height(factor: f64, nodes: [DVec3; 3], gradient: &mut [DVec3], hessian: Option<&mut Blocks>) {
+    let mean = (nodes[0].z + nodes[1].z + nodes[2].z) / 3.0;
+    let [a, b, c] = nodes;
+    // ∂n_z/∂xᵢ: the opposite side, turned in the plane.
+    let slopes = [c - b, a - c, b - a].map(|side| DVec3::new(-side.y, side.x, 0.0));
+    let n = (b - a).cross(c - a).z;
+    for (out, slope) in gradient.iter_mut().zip(slopes) {
+        *out += factor * (0.5 * mean * slope + n / 6.0 * DVec3::Z);
+    }
+    let Some(hessian) = hessian else { return };
+    let (sixth, turn) = (factor / 6.0, 0.5 * factor * mean);
+    for i in 0..3 {
+        for j in 0..3 {
+            // ∂²n_z/∂xᵢ∂yⱼ is 1 for the next corner and −1 for the one before.
+            let sign = match (3 + j - i) % 3 {
+                0 => 0.0,
+                1 => turn,
+                _ => -turn,
+            };
+            let x = DVec3::new(0.0, -sign, sixth * slopes[j].x);
+            let y = DVec3::new(sign, 0.0, sixth * slopes[j].y);
+            let z = sixth * slopes[i];
+            hessian.add(i, j, DMat3::from_cols(x, y, z));
         }
     }
 }

@@ -1,13 +1,13 @@
 //! How vertices may move: on constraints, on boundaries, fixed; and the normals along which Newton steps move them.
 
-use super::{
-    Places,
-    problem::{Problem, Wall},
-};
+use super::{Places, problem::Problem};
 use crate::{
     evolver::{
-        datafile::{Representation, Side},
-        surface::{BoundaryId, ConstraintId, Directed, Neighbours, Surface, VertexId},
+        datafile::Side,
+        surface::{
+            BoundaryId, ConstraintId, Directed, Neighbours, Surface, VertexId, Wall, multipliers, one_sided,
+            return_to,
+        },
     },
     index::{Id, IndexVec},
 };
@@ -16,12 +16,22 @@ use glam::{DMat3, DVec3};
 /// What holds a vertex.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Hold {
-    /// It does not move.
-    Fixed,
+    /// Steps do not move it; it follows these constraints where they change.
+    Fixed(Vec<ConstraintId>),
     /// It moves on these constraints.
     On(Vec<ConstraintId>),
     /// It moves on a boundary by its parameters.
     Boundary(BoundaryId),
+}
+
+impl Hold {
+    /// The constraints of a vertex.
+    pub(super) fn constraints(&self) -> &[ConstraintId] {
+        match self {
+            Self::Fixed(constraints) | Self::On(constraints) => constraints,
+            Self::Boundary(_) => &[],
+        }
+    }
 }
 
 /// Everything that moves: places, boundary parameters, and which one-sided constraints are touched.
@@ -32,10 +42,6 @@ pub(crate) struct State {
     /// One bit for each constraint of the vertex that is one-sided and touched.
     pub(crate) hits: IndexVec<VertexId, u32>,
 }
-
-/// Steps and tolerance of the return to constraints: those of Surface Evolver, so that both stop at the same place.
-const STEPS: usize = 10;
-const TOLERANCE: f64 = 1e-12;
 
 impl State {
     pub(crate) fn new(surface: &Surface) -> Self {
@@ -70,6 +76,31 @@ impl State {
     }
 }
 
+/// Up to three directions.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Directions {
+    count: u8,
+    basis: [DVec3; 3],
+}
+
+impl Directions {
+    /// These, of which there are at most three.
+    pub(super) fn of(directions: &[DVec3]) -> Self {
+        let mut all = Self::default();
+        directions.iter().take(3).for_each(|&direction| all.push(direction));
+        all
+    }
+
+    fn push(&mut self, direction: DVec3) {
+        self.basis[usize::from(self.count)] = direction;
+        self.count += 1;
+    }
+
+    pub(super) fn as_slice(&self) -> &[DVec3] {
+        &self.basis[..usize::from(self.count)]
+    }
+}
+
 /// Gradients of the constraints that hold a vertex now: at most three.
 fn active<'a>(
     problem: &'a Problem,
@@ -99,7 +130,7 @@ impl Problem {
     /// `vector` without its part against the constraints that hold a vertex; on a boundary, the velocity of its parameters.
     pub(crate) fn projected(&self, state: &State, vertex: VertexId, vector: DVec3) -> DVec3 {
         match &self.holds[vertex] {
-            Hold::Fixed => DVec3::ZERO,
+            Hold::Fixed(_) => DVec3::ZERO,
             Hold::On(constraints) if constraints.is_empty() => vector,
             Hold::On(constraints) => {
                 let p = state.places[vertex];
@@ -131,7 +162,7 @@ impl Problem {
     /// Moves one vertex by `scale` times its velocity (see [`Problem::projected`]), without the return to constraints.
     pub(crate) fn push(&self, state: &mut State, vertex: VertexId, velocity: DVec3, scale: f64) {
         match &self.holds[vertex] {
-            Hold::Fixed => {}
+            Hold::Fixed(_) => {}
             Hold::On(_) => state.places[vertex] += scale * velocity,
             Hold::Boundary(boundary) => {
                 let parameters = &mut state.parameters[vertex];
@@ -145,42 +176,16 @@ impl Problem {
     /// Brings a vertex back onto its constraints; `reset` forgets which one-sided ones it touched. False if it does not
     /// get there.
     pub(crate) fn settle(&self, state: &mut State, vertex: VertexId, reset: bool) -> bool {
-        let Hold::On(constraints) = &self.holds[vertex] else { return true };
+        let (Hold::On(constraints) | Hold::Fixed(constraints)) = &self.holds[vertex] else { return true };
         if constraints.is_empty() {
             return true;
         }
-        let mut hits = if reset { 0 } else { state.hits[vertex] };
-        let mut p = state.places[vertex];
-        for _ in 0..STEPS {
-            let mut rows: Vec<(DVec3, f64)> = Vec::with_capacity(constraints.len());
-            let mut total = 0.0;
-            for (at, &id) in constraints.iter().enumerate() {
-                let wall = &self.walls[id];
-                let jet = wall.formula.jet(p);
-                let free = match wall.side {
-                    Side::On => false,
-                    Side::NonNegative => jet.value > TOLERANCE,
-                    Side::NonPositive => jet.value < -TOLERANCE,
-                };
-                let bit = 1 << at.min(31);
-                if free && hits & bit == 0 {
-                    continue;
-                }
-                if wall.side != Side::On {
-                    hits |= bit;
-                }
-                total += jet.value.abs();
-                rows.push((jet.gradient, jet.value));
-            }
-            state.hits[vertex] = hits;
-            state.places[vertex] = p;
-            if total < TOLERANCE {
-                return true;
-            }
-            p -= least_motion(&rows);
-        }
-        state.places[vertex] = p;
-        p.is_finite()
+        let hits = if reset { 0 } else { state.hits[vertex] };
+        let walls = constraints.iter().map(|&id| &self.walls[id]);
+        let returned = return_to(walls, hits, state.places[vertex]);
+        state.places[vertex] = returned.place;
+        state.hits[vertex] = returned.hits;
+        returned.finite
     }
 
     /// Brings all vertices back; the first that does not get there.
@@ -221,12 +226,21 @@ impl Problem {
         }
     }
 
+    /// Whether a vertex's motion is bent: by constraints or a boundary.
+    pub(super) fn is_bent(&self, vertex: VertexId) -> bool {
+        match &self.holds[vertex] {
+            Hold::Fixed(_) => false,
+            Hold::On(constraints) => !constraints.is_empty(),
+            Hold::Boundary(_) => true,
+        }
+    }
+
     /// The second-order part of the return to constraints, and of a boundary's bend, under the gradient `force`: what is added
     /// to a vertex's own block of the Hessian, in its own directions.
     pub(super) fn bend(&self, state: &State, vertex: VertexId, force: DVec3, basis: &[DVec3]) -> DMat3 {
         let mut block = DMat3::ZERO;
         match &self.holds[vertex] {
-            Hold::Fixed => {}
+            Hold::Fixed(_) => {}
             Hold::On(constraints) => {
                 let p = state.places[vertex];
                 let jets: Vec<_> =
@@ -262,14 +276,18 @@ impl Problem {
         &self,
         state: &State,
         vertex: VertexId,
-        normals: Option<&[DVec3]>,
+        normals: Option<&Directions>,
         plane: bool,
-    ) -> Vec<DVec3> {
+    ) -> Directions {
         match &self.holds[vertex] {
-            Hold::Fixed => Vec::new(),
+            Hold::Fixed(_) => Directions::default(),
             Hold::Boundary(boundary) => {
                 let [u, v] = self.boundary_tangents(*boundary, state.parameters[vertex]);
-                if v.length_squared() > 0.0 { vec![u, v] } else { vec![u] }
+                let count = if v.length_squared() > 0.0 { 2 } else { 1 };
+                Directions::of(&[u, v][..count])
+            }
+            Hold::On(constraints) if constraints.is_empty() && !plane => {
+                normals.copied().unwrap_or_else(|| Directions::of(&DVec3::AXES))
             }
             Hold::On(constraints) => {
                 let p = state.places[vertex];
@@ -279,12 +297,12 @@ impl Problem {
                 if plane {
                     held = orthonormal([DVec3::Z].into_iter().chain(held));
                 }
-                let wanted: &[DVec3] = normals.unwrap_or(&DVec3::AXES);
+                let wanted: &[DVec3] = normals.map_or(&DVec3::AXES, Directions::as_slice);
                 let within = wanted.iter().map(|&w| held.iter().fold(w, |rest, &n| rest - rest.dot(n) * n));
                 // A normal that the constraint nearly forbids is no freedom: a step along it would be wild.
-                let mut basis: Vec<DVec3> = Vec::new();
+                let mut basis = Directions::default();
                 for w in within {
-                    let rest = basis.iter().fold(w, |rest, &b| rest - rest.dot(b) * b);
+                    let rest = basis.as_slice().iter().fold(w, |rest, &b| rest - rest.dot(b) * b);
                     if rest.length() > LEAST_SLANT {
                         basis.push(rest / rest.length());
                     }
@@ -297,140 +315,3 @@ impl Problem {
 
 /// The least sine between a normal and a constraint's normal for which the vertex keeps its freedom.
 const LEAST_SLANT: f64 = 1e-6;
-
-/// The least motion that changes the values of all rows by what they say.
-fn least_motion(rows: &[(DVec3, f64)]) -> DVec3 {
-    rows.iter().zip(multipliers(rows)).map(|((gradient, _), factor)| factor * *gradient).sum()
-}
-
-/// Factors `c` with `Σ cⱼ gⱼ·gᵢ = vᵢ`, by Gauss elimination of up to three rows; zero where rows depend on each other.
-#[allow(clippy::needless_range_loop, reason = "elimination goes by rows and columns")]
-fn multipliers(rows: &[(DVec3, f64)]) -> Vec<f64> {
-    let n = rows.len().min(3);
-    let mut matrix = [[0.0; 4]; 3];
-    for (row, (gradient, value)) in matrix.iter_mut().zip(&rows[..n]) {
-        for (entry, (other, _)) in row.iter_mut().zip(&rows[..n]) {
-            *entry = gradient.dot(*other);
-        }
-        row[3] = *value;
-    }
-    let mut dropped = [false; 3];
-    for pivot in 0..n {
-        let size = rows[pivot].0.length_squared();
-        if matrix[pivot][pivot] <= 1e-14 * size || size <= 0.0 {
-            dropped[pivot] = true;
-            continue;
-        }
-        for row in 0..n {
-            if row != pivot && !dropped[row] {
-                let factor = matrix[row][pivot] / matrix[pivot][pivot];
-                for column in 0..4 {
-                    matrix[row][column] -= factor * matrix[pivot][column];
-                }
-            }
-        }
-    }
-    (0..rows.len()).map(|i| if i < n && !dropped[i] { matrix[i][3] / matrix[i][i] } else { 0.0 }).collect()
-}
-
-/// The normals of a surface at each vertex: one within a film, two where three films meet along a line, none (all directions)
-/// where lines meet.
-pub(super) fn normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Vec<DVec3>>> {
-    match surface.representation {
-        Representation::Soapfilm => film_normals(surface, neighbours),
-        Representation::String => string_normals(surface, neighbours),
-    }
-}
-
-fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Vec<DVec3>>> {
-    let areas: IndexVec<crate::evolver::surface::FacetId, DVec3> =
-        surface.facets.ids().map(|id| surface.area_vector(id)).collect();
-    let mut middles: IndexVec<VertexId, Option<crate::evolver::surface::EdgeId>> =
-        IndexVec::from_elem(None, surface.vertices.len());
-    for (id, edge) in surface.edges.enumerated() {
-        if let Some(middle) = edge.middle {
-            middles[middle] = Some(id);
-        }
-    }
-    surface
-        .vertices
-        .ids()
-        .map(|id| {
-            let around: &[_] = match &middles[id] {
-                Some(edge) => std::slice::from_ref(edge),
-                None => &neighbours.edges[id],
-            };
-            let lines: Vec<_> =
-                around.iter().copied().filter(|&edge| neighbours.facets[edge].len() > 2).collect();
-            let bare = around.iter().all(|&edge| neighbours.facets[edge].is_empty());
-            if bare || lines.len() > 2 {
-                return None;
-            }
-            if !lines.is_empty() {
-                return Some(line_normals(surface, id, &lines));
-            }
-            let facets = match &middles[id] {
-                Some(edge) => neighbours.facets[*edge].iter().map(|&(facet, _)| facet).collect(),
-                None => neighbours.facets_at(id),
-            };
-            let &first = facets.first()?;
-            // Neighbouring facets may be turned round: all are counted to the side of the first.
-            let start = areas[first];
-            let sum: DVec3 = facets
-                .iter()
-                .map(|&facet| if areas[facet].dot(start) < 0.0 { -areas[facet] } else { areas[facet] })
-                .sum();
-            (sum.length() > 0.0).then(|| vec![sum.normalize()])
-        })
-        .collect()
-}
-
-/// The two directions across the line that a vertex lies on.
-fn line_normals(
-    surface: &Surface,
-    vertex: VertexId,
-    lines: &[crate::evolver::surface::EdgeId],
-) -> Vec<DVec3> {
-    let outward = |edge: crate::evolver::surface::EdgeId| {
-        let reversed = surface.edges[edge].ends[0] != vertex;
-        surface.side(Directed { edge, reversed })
-    };
-    let middle = surface.vertices[vertex].middle;
-    let tangent = match lines {
-        [a, b] if !middle => outward(*a) - outward(*b),
-        [a, ..] => surface.side(Directed { edge: *a, reversed: false }),
-        [] => DVec3::ZERO,
-    };
-    if tangent.length() <= 0.0 {
-        return DVec3::AXES.to_vec();
-    }
-    let (u, v) = tangent.normalize().any_orthonormal_pair();
-    vec![u, v]
-}
-
-fn string_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Vec<DVec3>>> {
-    let mut tangents: IndexVec<VertexId, Option<DVec3>> = IndexVec::from_elem(None, surface.vertices.len());
-    for (id, edge) in surface.edges.enumerated() {
-        if let Some(middle) = edge.middle {
-            tangents[middle] = Some(surface.side(Directed { edge: id, reversed: false }));
-        }
-    }
-    for vertex in surface.vertices.ids() {
-        if let [a, b] = neighbours.edges[vertex][..] {
-            let outward =
-                |edge| surface.side(Directed { edge, reversed: surface.edges[edge].ends[0] != vertex });
-            tangents[vertex] = Some(outward(a) - outward(b));
-        }
-    }
-    tangents
-        .into_iter()
-        .map(|tangent| {
-            let tangent = (*tangent)?.try_normalize()?;
-            if surface.dimension == 2 {
-                return Some(vec![DVec3::Z.cross(tangent)]);
-            }
-            let (u, v) = tangent.any_orthonormal_pair();
-            Some(vec![u, v])
-        })
-        .collect()
-}

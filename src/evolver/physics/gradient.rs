@@ -2,6 +2,7 @@
 
 use super::{
     Places,
+    assemble::{Own, Share},
     edge::{self, EdgeField},
     facet::FacetField,
     problem::{Destination, EdgePart, FunctionalId, Problem, shifted},
@@ -89,6 +90,10 @@ pub(super) struct Local {
 impl Problem {
     /// The pattern of the functionals by vertex, with zero gradients.
     pub(crate) fn slots(&self) -> Slots {
+        self.pattern.get_or_init(|| self.new_slots()).clone()
+    }
+
+    fn new_slots(&self) -> Slots {
         let held: Vec<bool> = self.functionals.iter().map(|functional| functional.target.is_some()).collect();
         let mut pairs: Vec<(u32, FunctionalId)> = Vec::new();
         let mut note = |nodes: &[u32], destination: Destination| {
@@ -236,38 +241,61 @@ impl Problem {
         }
     }
 
-    /// Gradient and Hessian of every element's share of the weighted sum; elements without a share are left out.
-    pub(super) fn locals(&self, places: &Places, weights: &Weights) -> Vec<Local> {
+    /// Gradient and Hessian of every element's share of the weighted sum, chunk by chunk.
+    pub(super) fn shares(
+        &self,
+        places: &Places,
+        weights: &Weights,
+        directions: &IndexVec<VertexId, Own>,
+    ) -> Vec<Share> {
         let places = places.as_slice();
-        let mut out: Vec<Local> =
-            self.facets.par_iter().filter_map(|term| self.facet_local(term, places, weights)).collect();
-        let edges: Vec<Local> =
-            self.edges.par_iter().filter_map(|term| self.edge_local(term, places, weights)).collect();
-        out.extend(edges);
+        let facets = self.facets.par_chunks(CHUNK).map(|terms| {
+            let (mut local, mut share) = (Local::default(), Share::default());
+            for term in terms {
+                if self.facet_local(term, places, weights, &mut local) {
+                    share.add(&local, directions);
+                }
+            }
+            share
+        });
+        let edges = self.edges.par_chunks(CHUNK).map(|terms| {
+            let (mut local, mut share) = (Local::default(), Share::default());
+            for term in terms {
+                self.edge_local(term, places, weights, &mut local);
+                share.add(&local, directions);
+            }
+            share
+        });
+        let mut shares: Vec<Share> = facets.collect();
+        shares.extend(edges.collect::<Vec<Share>>());
+        let (mut local, mut share) = (Local::default(), Share::default());
         for point in &self.points {
             let jet = point.field.jet(places[point.vertex.index()]);
             let factor = weights.of(point.destination) * point.weight;
-            let mut local = Local::new(&[crate::index::checked_u32(point.vertex.index())]);
+            local.restart(&[crate::index::checked_u32(point.vertex.index())]);
             local.gradient[0] = factor * jet.gradient;
             local.hessian.add(0, 0, factor * jet.hessian);
-            out.push(local);
+            share.add(&local, directions);
         }
-        out
+        shares.push(share);
+        shares
     }
 
+    /// Makes `local` the share of a facet; false where it has none.
     fn facet_local(
         &self,
         term: &super::problem::Term<6>,
         places: &[DVec3],
         weights: &Weights,
-    ) -> Option<Local> {
+        local: &mut Local,
+    ) -> bool {
         let parts = &self.facet_parts[term.parts()];
         if term.tension.abs() <= 0.0 && parts.is_empty() {
-            return None;
+            return false;
         }
         let nodes = term.places(places);
         let nodes = &nodes[..usize::from(term.count)];
-        let mut local = Local::new(term.nodes());
+        local.restart(term.nodes());
         if term.tension.abs() > 0.0 {
             let factor = weights.energy * term.tension;
             FacetField::Area.add(factor, nodes, &mut local.gradient, Some(&mut local.hessian));
@@ -282,47 +310,50 @@ impl Problem {
             let seen = moved.as_ref().map_or(nodes, |moved| &moved[..nodes.len()]);
             field.add(factor, seen, &mut local.gradient, Some(&mut local.hessian));
         }
-        Some(local)
+        true
     }
 
+    /// Makes `local` the share of an edge.
     fn edge_local(
         &self,
         term: &super::problem::Term<3>,
         places: &[DVec3],
         weights: &Weights,
-    ) -> Option<Local> {
-        let parts = &self.edge_parts[term.parts()];
-        if term.tension.abs() <= 0.0 && parts.is_empty() {
-            return None;
-        }
+        local: &mut Local,
+    ) {
         let nodes = term.places(places);
         let nodes = &nodes[..usize::from(term.count)];
-        let mut local = Local::new(term.nodes());
+        local.restart(term.nodes());
         if term.tension.abs() > 0.0 {
             let factor = weights.energy * term.tension;
             let rule = self.rule(nodes.len());
             EdgeField::Length.add(factor, rule, nodes, &mut local.gradient, Some(&mut local.hessian));
         }
-        for part in parts {
+        for part in &self.edge_parts[term.parts()] {
             let factor = weights.of(part.destination) * part.weight;
             if factor.abs() > 0.0 {
-                let Local { gradient, hessian, .. } = &mut local;
+                let Local { gradient, hessian, .. } = &mut *local;
                 self.edge_part(part, nodes, factor, gradient, Some(hessian));
             }
         }
-        Some(local)
+    }
+}
+
+/// Elements whose shares one thread assembles at a time: fixed, so that the order does not depend on the number of threads.
+const CHUNK: usize = 1024;
+
+impl Default for Local {
+    fn default() -> Self {
+        Self { nodes: [0; 6], count: 0, gradient: [DVec3::ZERO; 6], hessian: Blocks::zero(0) }
     }
 }
 
 impl Local {
-    fn new(nodes: &[u32]) -> Self {
-        let mut all = [0; 6];
-        all[..nodes.len()].copy_from_slice(nodes);
-        Self {
-            nodes: all,
-            count: nodes.len(),
-            gradient: [DVec3::ZERO; 6],
-            hessian: Blocks::zero(nodes.len()),
-        }
+    /// Makes it zero, for an element of these nodes.
+    fn restart(&mut self, nodes: &[u32]) {
+        self.count = nodes.len();
+        self.nodes[..nodes.len()].copy_from_slice(nodes);
+        self.gradient = [DVec3::ZERO; 6];
+        self.hessian.restart(nodes.len());
     }
 }

@@ -10,19 +10,24 @@
 //! | one facet, one edge: integral, gradient, Hessian; areas are the foam's elements | `facet.rs`, `edge.rs` |
 //! | all terms of a surface; energy and functionals | `problem.rs`, `terms.rs` |
 //! | gradients, and volumes' gradients by vertex | `gradient.rs` |
-//! | directions in which vertices may move; return to constraints | `freedom.rs` |
+//! | directions in which vertices may move; return to constraints; normals of films | `freedom.rs`, `normals.rs` |
 //! | gradient steps with volumes held | `descend.rs` |
-//! | Newton steps, inertia, eigenvalues; the foam's sparse solver | `newton.rs` |
+//! | the matrix of a Newton step; the step and its inertia; eigenvalues, by the foam's sparse solver | `assemble.rs`, `newton.rs`, `eigen.rs` |
+//! | carrying the surface along its walls | `carry.rs` |
 //! | volumes closed on the walls themselves, by the foam's kernels | `closed.rs` |
 
+mod assemble;
+mod carry;
 pub(crate) mod closed;
 pub(crate) mod descend;
 mod edge;
+mod eigen;
 mod facet;
 mod field;
 pub(crate) mod freedom;
 mod gradient;
 pub(crate) mod newton;
+mod normals;
 mod problem;
 pub(crate) mod terms;
 

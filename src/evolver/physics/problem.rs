@@ -5,19 +5,19 @@ use super::{
     edge::{self, EdgeField},
     facet::FacetField,
     freedom::Hold,
+    gradient::Slots,
 };
 use crate::{
     evolver::{
-        datafile::Side,
         language::formula::Bound,
-        surface::{BodyId, BoundaryId, ConstraintId, VertexId},
+        surface::{BodyId, BoundaryId, ConstraintId, VertexId, Wall},
     },
     foam::complex::CurvePoint,
     index::{Id, IndexVec},
 };
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 crate::define_id!(
     /// A functional of a [`Problem`].
@@ -109,13 +109,6 @@ pub(super) struct Point {
     pub(super) weight: f64,
 }
 
-/// A constraint with the variables' values put in.
-#[derive(Clone, Debug)]
-pub(crate) struct Wall {
-    pub(crate) formula: Bound,
-    pub(crate) side: Side,
-}
-
 /// Everything that energy and functionals need, for one topology and one set of parameters.
 #[derive(Clone, Debug)]
 pub struct Problem {
@@ -132,6 +125,10 @@ pub struct Problem {
     pub(super) holds: IndexVec<VertexId, Hold>,
     pub(super) rules: [Vec<CurvePoint>; 2],
     pub(super) strings: bool,
+    /// Whether volumes are restored to a part of their shares, as quantities are, instead of absolutely.
+    pub(crate) relative: bool,
+    /// Which functionals depend on which vertex, once it was asked for.
+    pub(super) pattern: OnceLock<Slots>,
 }
 
 /// A field along edges, or the gap at a convex wall.
@@ -150,6 +147,8 @@ pub struct Values {
     pub area: f64,
     /// The functionals.
     pub functionals: IndexVec<FunctionalId, f64>,
+    /// The sums of the absolute shares of which the functionals are made.
+    pub(crate) magnitudes: IndexVec<FunctionalId, f64>,
 }
 
 /// Facets that one thread sums at a time: fixed, so that sums do not depend on the number of threads.
@@ -159,7 +158,8 @@ const CHUNK: usize = 2048;
 struct Sums {
     energy: f64,
     area: f64,
-    functionals: Vec<(FunctionalId, f64)>,
+    /// Each functional with its sum and the sum of the absolute shares.
+    functionals: Vec<(FunctionalId, f64, f64)>,
 }
 
 impl Sums {
@@ -172,9 +172,12 @@ impl Sums {
             Destination::Energy => self.energy += value,
             // Neighbouring elements share their functionals: the last entries are the likely ones.
             Destination::Functional(id) => {
-                match self.functionals.iter_mut().rev().take(8).find(|(other, _)| *other == id) {
-                    Some((_, sum)) => *sum += value,
-                    None => self.functionals.push((id, value)),
+                match self.functionals.iter_mut().rev().take(8).find(|(other, ..)| *other == id) {
+                    Some((_, sum, magnitude)) => {
+                        *sum += value;
+                        *magnitude += value.abs();
+                    }
+                    None => self.functionals.push((id, value, value.abs())),
                 }
             }
         }
@@ -215,12 +218,14 @@ impl Problem {
             energy: 0.0,
             area: 0.0,
             functionals: self.functionals.iter().map(|functional| functional.constant).collect(),
+            magnitudes: IndexVec::from_elem(0.0, self.functionals.len()),
         };
         for sums in chunks.into_iter().chain(edges).chain([points]) {
             values.energy += sums.energy;
             values.area += sums.area;
-            for (id, value) in sums.functionals {
+            for (id, value, magnitude) in sums.functionals {
                 values.functionals[id] += value;
+                values.magnitudes[id] += magnitude;
             }
         }
         for (id, functional) in self.functionals.enumerated() {
@@ -280,6 +285,16 @@ impl Problem {
             }
         }
         sums
+    }
+
+    /// How many facets of films turned over by more than a right angle between two sets of places.
+    pub(crate) fn turned_over(&self, old: &Places, new: &Places) -> usize {
+        let normal = |term: &Term<6>, places: &Places| {
+            let [a, b, c, ..] = term.places(places.as_slice());
+            (b - a).cross(c - a)
+        };
+        let turned = |term: &&Term<6>| normal(term, old).dot(normal(term, new)) < 0.0;
+        self.facets.iter().filter(|term| term.tension.abs() > 0.0).filter(turned).count()
     }
 
     pub(super) fn rule(&self, nodes: usize) -> &[CurvePoint] {

@@ -5,18 +5,21 @@ use super::{
     facet::FacetField,
     field::VectorField,
     freedom::Hold,
-    problem::{Destination, EdgePart, Functional, FunctionalId, Measured, Part, Point, Problem, Term, Wall},
+    problem::{Destination, EdgePart, Functional, FunctionalId, Measured, Part, Point, Problem, Term},
 };
 use crate::{
     evolver::{
         datafile::{Datafile, FormulaVector, Method, Model, Purpose, Quantity, Representation},
         error::EvolverError,
         language::formula::{Bound, Variables},
-        surface::{BodyId, Common, Directed, EdgeId, FacetId, Neighbours, Surface, VertexId, body_images},
+        surface::{
+            BodyId, Common, Directed, EdgeId, FacetId, Neighbours, Surface, VertexId, Wall, body_images,
+        },
     },
     index::{Id, IndexVec, checked_u32},
 };
 use glam::{DVec3, IVec3};
+use std::sync::OnceLock;
 
 /// What may change while commands run.
 #[derive(Clone, Debug)]
@@ -28,6 +31,8 @@ pub(crate) struct Conditions<'a> {
     pub(crate) gap: f64,
     /// Targets and moduli of quantities.
     pub(crate) quantities: &'a [QuantityState],
+    /// Whether volumes count as quantities.
+    pub(crate) relative: bool,
 }
 
 /// The numbers of a quantity that commands can change.
@@ -83,6 +88,8 @@ impl Problem {
             holds: surface.vertices.iter().map(|vertex| hold(&vertex.common)).collect(),
             rules: rules(data),
             strings: surface.representation == Representation::String,
+            relative: conditions.relative,
+            pattern: OnceLock::new(),
         };
         let mut collector = Collector {
             data,
@@ -108,7 +115,7 @@ impl Problem {
 
 fn hold(common: &Common) -> Hold {
     match (common.fixed, common.boundary) {
-        (true, _) => Hold::Fixed,
+        (true, _) => Hold::Fixed(common.constraints.clone()),
         (false, Some(boundary)) => Hold::Boundary(boundary),
         (false, None) => Hold::On(common.constraints.clone()),
     }

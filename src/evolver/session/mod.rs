@@ -4,26 +4,33 @@
 //! |---|---|
 //! | the state; energies kept up to date | this page |
 //! | statements: loops, assignments, procedures | `execute.rs` |
+//! | assignments | `assign.rs` |
 //! | values of expressions | `evaluate.rs`, `attributes.rs` |
-//! | moving the surface: `g`, `hessian`, `V` and their kin | `motion.rs` |
+//! | moving the surface: `g`, `r`, `V` and their kin | `motion.rs` |
+//! | Newton steps and eigenvalues; sliding along walls | `seek.rs`, `slide.rs` |
+//! | short edges, small and narrow facets | `mend.rs` |
 //! | changing and listing elements | `elements.rs` |
 //! | text with formats | `format.rs` |
 //! | datafiles | `dump.rs` |
 
+mod assign;
 mod attributes;
 mod dump;
 mod elements;
 mod evaluate;
 mod execute;
 mod format;
+mod mend;
 mod motion;
+mod seek;
+mod slide;
 
 pub use execute::Flow;
 pub use format::significant;
 
 use super::{
     command::Statement,
-    datafile::{Datafile, Purpose},
+    datafile::{Datafile, Model, Purpose, Representation},
     error::EvolverError,
     language::formula::{GRAVITY, Variables},
     open::Document,
@@ -36,7 +43,10 @@ use super::{
     },
     surface::{BodyId, Neighbours, Surface},
 };
-use crate::index::{Id, IndexVec};
+use crate::{
+    foam::solve::symmetric::SymmetricPattern,
+    index::{Id, IndexVec},
+};
 use std::{collections::BTreeMap, sync::Arc};
 
 /// What a session asks of the program around it.
@@ -65,6 +75,8 @@ pub struct Session {
     gap: f64,
     descent: Descent,
     normal: bool,
+    /// Whether volumes and energies count as quantities, as they do in Surface Evolver from the first use that needs it.
+    by_quantities: bool,
     quiet: bool,
     eigenvalue: f64,
     /// How many commands may still run.
@@ -74,6 +86,8 @@ pub struct Session {
     problem: Option<Current>,
     /// Who borders on whom, as long as that stays.
     around: Option<Arc<Neighbours>>,
+    /// The order in which the last Newton matrix was factored.
+    pattern: Option<Arc<SymmetricPattern>>,
 }
 
 /// A problem that belongs to the present surface, with its values.
@@ -135,7 +149,6 @@ impl Session {
             variables: data.variables.clone(),
             gravity: data.gravity,
             gap: data.gap_constant,
-            data,
             surface,
             texts: BTreeMap::new(),
             procedures: BTreeMap::new(),
@@ -143,6 +156,7 @@ impl Session {
             multipliers,
             descent,
             normal: true,
+            by_quantities: data.boundaries.iter().any(|b| b.energy.is_some() || b.content.is_some()),
             quiet: false,
             eigenvalue: f64::NAN,
             budget: COMMAND_BUDGET,
@@ -150,6 +164,8 @@ impl Session {
             depth: 0,
             problem: None,
             around: None,
+            pattern: None,
+            data,
         };
         let name: Arc<str> = session.data.source.name.as_str().into();
         session.texts.insert("datafilename".into(), name);
@@ -161,10 +177,8 @@ impl Session {
     /// Middles for a datafile that says `quadratic` but gives none.
     fn make_quadratic(&mut self) {
         let wanted = self.surface.model;
-        if wanted == super::datafile::Model::Quadratic
-            && self.surface.edges.iter().any(|edge| edge.middle.is_none())
-        {
-            self.surface.model = super::datafile::Model::Linear;
+        if wanted == Model::Quadratic && self.surface.edges.iter().any(|edge| edge.middle.is_none()) {
+            self.surface.model = Model::Linear;
             self.surface.set_model(wanted);
         }
     }
@@ -202,6 +216,7 @@ impl Session {
                 gravity: self.gravity(),
                 gap: self.gap,
                 quantities: &self.quantities,
+                relative: self.by_quantities,
             };
             let problem = Problem::new(&self.data, &self.surface, &conditions)?;
             let mut state = State::new(&self.surface);
@@ -219,6 +234,25 @@ impl Session {
             Some(current) => Ok(current),
             None => Err(EvolverError::Surface("the surface has no terms".to_owned())),
         }
+    }
+
+    /// From now on volumes and energies count as quantities.
+    fn convert_to_quantities(&mut self) {
+        self.by_quantities = true;
+        if let Some(current) = &mut self.problem {
+            current.problem.relative = true;
+        }
+    }
+
+    /// Whether Surface Evolver takes second derivatives of this surface only as those of quantities.
+    fn needs_quantities(&self) -> bool {
+        let surface = &self.surface;
+        self.data.constraints.iter().any(|constraint| constraint.content.is_some())
+            || (surface.periods.is_some() && surface.bodies.iter().any(|body| body.target.is_some()))
+            || surface.bodies.iter().any(|body| body.prescribed)
+            || surface.model == Model::Quadratic
+            || surface.representation == Representation::String
+            || self.gravity().abs() > 0.0
     }
 
     /// Who borders on whom.

@@ -1,27 +1,23 @@
 //! Commands that move or refine the surface, and what they report.
 
 use super::{Current, Host, Session, evaluate::Scope, format::significant};
-use crate::{
-    evolver::{
-        command::{Action, Numeric, Simple},
-        datafile::{Model, Representation},
-        error::EvolverError,
-        language::{
-            expression::Expression,
-            formula::{GRAVITY, is_zero},
-        },
-        physics::{Values, freedom::State, newton::Newton},
-        source::Position,
-        surface::{EdgeId, FacetId, VertexId},
+use crate::evolver::{
+    command::{Action, Numeric, Simple},
+    datafile::Model,
+    error::EvolverError,
+    language::{
+        expression::Expression,
+        formula::{GRAVITY, is_zero},
     },
-    index::{Id, IndexVec},
+    source::Position,
+    surface::{EdgeId, VertexId},
 };
 use std::fmt::Write as _;
 
 /// Steps of one `g` at most.
 const MOST_STEPS: f64 = 1e7;
 
-type Done = Result<(), EvolverError>;
+pub(super) type Done = Result<(), EvolverError>;
 
 impl Session {
     pub(super) fn motion_command(
@@ -54,6 +50,7 @@ impl Session {
             Simple::Refine => {
                 self.surface.refine();
                 self.changed();
+                self.current()?;
                 self.counts(host);
             }
             Simple::Equiangulate => {
@@ -82,6 +79,7 @@ impl Session {
                 let model = if *simple == Simple::Linear { Model::Linear } else { Model::Quadratic };
                 self.set_model(model)?;
             }
+            Simple::Quantities => self.convert_to_quantities(),
             Simple::Recalculate => {
                 self.problem = None;
                 self.current()?;
@@ -121,7 +119,7 @@ impl Session {
         Ok(())
     }
 
-    fn say(&self, host: &mut dyn Host, text: &str) {
+    pub(super) fn say(&self, host: &mut dyn Host, text: &str) {
         if !self.quiet {
             host.print(text);
         }
@@ -149,6 +147,7 @@ impl Session {
             (Numeric::HessianSeek, value) => self.hessian_seek(value.unwrap_or(10.0), host),
             (Numeric::Saddle, value) => self.saddle(value.unwrap_or(10.0), host),
             (Numeric::Eigenprobe, value) => self.eigenprobe(value.unwrap_or(0.0), host),
+            (Numeric::Slide, value) => self.slide(value, host),
             (Numeric::FixScale, value) => {
                 self.descent.fixed = value.is_some_and(|v| !is_zero(v));
                 if let Some(value) = value.filter(|v| !is_zero(*v)) {
@@ -210,7 +209,7 @@ impl Session {
             let (done, pattern) = current.problem.descend(&mut current.state, &mut self.descent, pattern)?;
             slots = Some(pattern);
             self.multipliers = done.multipliers.clone();
-            let folded = folded_facets(&self.surface, &old, &current.state);
+            let folded = current.problem.turned_over(&old.places, &current.state.places);
             if folded > 0 && done.values.energy > done.base {
                 current.state = old;
                 self.say(host, "The step would turn facets over and raise the energy: undone.\n");
@@ -239,199 +238,11 @@ impl Session {
     }
 
     /// Writes the places back into the surface and sees that volumes are what they seem.
-    fn finish_motion(&mut self) -> Done {
+    pub(super) fn finish_motion(&mut self) -> Done {
         if let Some(current) = &self.problem {
             current.state.store(&mut self.surface);
         }
         self.compare_volumes()
-    }
-
-    /// The matrix of a Newton step here.
-    fn newton(&mut self) -> Result<(Newton, Values, State), EvolverError> {
-        self.current()?;
-        let around = self.neighbours();
-        let Some(current) = &mut self.problem else {
-            return Err(EvolverError::Surface("the surface has no terms".to_owned()));
-        };
-        if self.multipliers.iter().all(|m| is_zero(*m)) {
-            self.multipliers = current.problem.estimated_multipliers(&current.state)?;
-        }
-        let newton = Newton::new(
-            &current.problem,
-            &self.surface,
-            &around,
-            &current.state,
-            &self.multipliers,
-            self.normal,
-        )?;
-        Ok((newton, current.values.clone(), current.state.clone()))
-    }
-
-    /// `hessian`: a full Newton step, undone where it would destroy the surface.
-    fn hessian(&mut self, host: &mut dyn Host) -> Done {
-        let (newton, values, old) = self.newton()?;
-        let residual = newton.residual();
-        let Some(current) = &mut self.problem else { return Ok(()) };
-        let step = newton.step(&current.problem, &values)?;
-        if step.unstable > 0 {
-            let text = format!("Hessian not positive definite: {} direction(s) go down.\n", step.unstable);
-            if !self.quiet {
-                host.print(&text);
-            }
-        }
-        let (moved, after) = current.problem.stepped(&old, &step.velocity, 1.0)?;
-        let multipliers = sum(&self.multipliers, &step.multipliers);
-        if let Some(reason) = self.refused(&old, &moved, &values, &after, residual, &multipliers)? {
-            self.say(host, &format!("The step is undone: {reason}. Use hessian_seek or g steps first.\n"));
-            return Ok(());
-        }
-        self.accept(moved, after, multipliers)?;
-        self.report_energy(host)
-    }
-
-    /// Why a Newton step must not be taken.
-    fn refused(
-        &mut self,
-        old: &State,
-        moved: &State,
-        before: &Values,
-        after: &Values,
-        residual: f64,
-        multipliers: &IndexVec<crate::evolver::physics::FunctionalId, f64>,
-    ) -> Result<Option<String>, EvolverError> {
-        if !after.energy.is_finite() || moved.places.iter().any(|p| !p.is_finite()) {
-            return Ok(Some("it gives no finite energy".to_owned()));
-        }
-        let folded = folded_facets(&self.surface, old, moved);
-        if folded > 0 {
-            return Ok(Some(format!("it would turn {folded} facet(s) over")));
-        }
-        // The energy less what the change of the held volumes costs.
-        let Some(current) = &self.problem else { return Ok(None) };
-        let work: f64 = current
-            .problem
-            .functionals()
-            .enumerated()
-            .filter(|(_, f)| f.target.is_some())
-            .map(|(id, _)| multipliers[id] * (after.functionals[id] - before.functionals[id]))
-            .sum();
-        let rise = after.energy - before.energy - work;
-        if rise <= 1e-10 * before.energy.abs() {
-            return Ok(None);
-        }
-        // On the way to a saddle the energy may rise, but the forces must fall.
-        let around = self.neighbours();
-        let Some(current) = &self.problem else { return Ok(None) };
-        let there = Newton::new(&current.problem, &self.surface, &around, moved, multipliers, self.normal)?;
-        if there.residual() < residual {
-            return Ok(None);
-        }
-        Ok(Some(format!("it would raise the energy by {rise:.3e} and the forces")))
-    }
-
-    fn accept(
-        &mut self,
-        state: State,
-        values: Values,
-        multipliers: IndexVec<crate::evolver::physics::FunctionalId, f64>,
-    ) -> Done {
-        if let Some(current) = &mut self.problem {
-            (current.state, current.values) = (state, values);
-        }
-        self.multipliers = multipliers;
-        self.descent.restart();
-        self.finish_motion()
-    }
-
-    fn report_energy(&mut self, host: &mut dyn Host) -> Done {
-        let values = self.values()?;
-        let label = if self.has_films() { "area" } else { "length" };
-        self.say(
-            host,
-            &format!(
-                "  1. {label}: {:>17} energy: {:>17}\n",
-                significant(values.area, 15),
-                significant(values.energy, 15)
-            ),
-        );
-        Ok(())
-    }
-
-    /// `hessian_seek`: the best place along the Newton direction.
-    fn hessian_seek(&mut self, most: f64, host: &mut dyn Host) -> Done {
-        let (newton, values, old) = self.newton()?;
-        let Some(current) = &self.problem else { return Ok(()) };
-        let step = newton.step(&current.problem, &values)?;
-        let (_, base) = current.problem.stepped(&old, &step.velocity, 0.0)?;
-        let energy = |scale: f64| -> Result<f64, EvolverError> {
-            let energy = current.problem.stepped(&old, &step.velocity, scale)?.1.energy;
-            Ok(if energy.is_finite() { energy } else { f64::MAX })
-        };
-        let best = seek(&energy, base.energy, most)?;
-        let (moved, after) = current.problem.stepped(&old, &step.velocity, best)?;
-        let folded = folded_facets(&self.surface, &old, &moved);
-        let taken = best.abs() > 0.0 && folded == 0 && after.energy.is_finite();
-        let (state, after) =
-            if taken { (moved, after) } else { current.problem.stepped(&old, &step.velocity, 0.0)? };
-        let multipliers =
-            if taken { sum(&self.multipliers, &step.multipliers) } else { self.multipliers.clone() };
-        self.accept(state, after, multipliers)?;
-        self.say(host, &format!("  1. stepsize: {}\n", significant(if taken { best } else { 0.0 }, 6)));
-        self.report_energy(host)
-    }
-
-    /// `saddle`: down the most unstable direction.
-    fn saddle(&mut self, most: f64, host: &mut dyn Host) -> Done {
-        let (newton, _, old) = self.newton()?;
-        let (values, direction) = newton.eigenvalues(lowest_guess(&newton)?, 1)?;
-        let lowest = values.first().copied().unwrap_or(0.0);
-        self.eigenvalue = lowest;
-        if lowest >= 0.0 {
-            self.say(
-                host,
-                &format!("Lowest eigenvalue {}: no direction goes down.\n", significant(lowest, 8)),
-            );
-            return Ok(());
-        }
-        let Some(current) = &self.problem else { return Ok(()) };
-        let (_, base) = current.problem.stepped(&old, &direction, 0.0)?;
-        let energy = |scale: f64| -> Result<f64, EvolverError> {
-            let energy = current.problem.stepped(&old, &direction, scale)?.1.energy;
-            Ok(if energy.is_finite() { energy } else { f64::MAX })
-        };
-        let best = seek(&energy, base.energy, most)?;
-        let (moved, after) = current.problem.stepped(&old, &direction, best)?;
-        if folded_facets(&self.surface, &old, &moved) > 0 {
-            self.say(host, "The step is undone: it would turn facets over.\n");
-            return Ok(());
-        }
-        let multipliers = current.problem.estimated_multipliers(&moved)?;
-        self.accept(moved, after, multipliers)?;
-        self.say(
-            host,
-            &format!("Lowest eigenvalue {}, stepsize {}\n", significant(lowest, 8), significant(best, 6)),
-        );
-        self.report_energy(host)
-    }
-
-    fn eigenprobe(&mut self, value: f64, host: &mut dyn Host) -> Done {
-        let (newton, ..) = self.newton()?;
-        let below = newton.below(value)?;
-        host.print(&format!("Eigencounts below {}: {below}\n", significant(value, 8)));
-        Ok(())
-    }
-
-    fn ritz(&mut self, shift: f64, count: usize, host: &mut dyn Host) -> Done {
-        let (newton, ..) = self.newton()?;
-        let (values, _) = newton.eigenvalues(shift, count)?;
-        let mut text = String::new();
-        for (at, value) in values.iter().enumerate() {
-            // Writing to a string does not fail.
-            let _ = writeln!(text, "{:4}. {}", at + 1, significant(*value, 12));
-        }
-        self.eigenvalue = values.last().copied().unwrap_or(f64::NAN);
-        host.print(&text);
-        Ok(())
     }
 
     /// `v`: the bodies, with their volumes both ways.
@@ -474,177 +285,12 @@ impl Session {
             ),
         );
     }
-
-    fn remove_short(&mut self, value: f64, host: &mut dyn Host) -> Done {
-        let mut count = 0;
-        let mut tried = 0;
-        while let Some(edge) = self
-            .surface
-            .edges
-            .ids()
-            .filter(|&id| self.surface.edge_length(id) < value && !self.surface.edges[id].common.fixed)
-            .nth(tried)
-        {
-            self.spend()?;
-            if self.surface.collapse(edge) {
-                count += 1;
-            } else {
-                tried += 1;
-            }
-        }
-        self.changed();
-        self.say(host, &format!("Edges deleted: {count}\n"));
-        Ok(())
-    }
-
-    fn remove_small(&mut self, value: f64, host: &mut dyn Host) -> Done {
-        let mut count = 0;
-        let mut tried = 0;
-        while let Some(facet) = self
-            .surface
-            .facets
-            .ids()
-            .filter(|&id| self.has_films() && self.surface.facet_area(id) < value)
-            .nth(tried)
-        {
-            self.spend()?;
-            let shortest = self.surface.facets[facet]
-                .edges
-                .iter()
-                .map(|d| d.edge)
-                .min_by(|a, b| self.surface.edge_length(*a).total_cmp(&self.surface.edge_length(*b)));
-            if shortest.is_some_and(|edge| self.surface.collapse(edge)) {
-                count += 1;
-            } else {
-                tried += 1;
-            }
-        }
-        self.changed();
-        self.say(host, &format!("Facets deleted: {count}\n"));
-        Ok(())
-    }
-
-    /// `K`: divides the longest edge of facets with an angle below `value`.
-    fn divide_skinny(&mut self, value: f64, host: &mut dyn Host) -> Done {
-        if self.surface.representation == Representation::String {
-            return Ok(());
-        }
-        let skinny = |id: FacetId| {
-            let mut sides: Vec<(f64, EdgeId)> = self.surface.facets[id]
-                .edges
-                .iter()
-                .map(|d| (self.surface.edge_length(d.edge), d.edge))
-                .collect();
-            sides.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let [(a, _), (b, _), (c, longest)] = sides[..] else { return None };
-            let cosine = (b * b + c * c - a * a) / (2.0 * b * c);
-            (cosine.clamp(-1.0, 1.0).acos() < value).then_some(longest)
-        };
-        let mut long: Vec<EdgeId> = self.surface.facets.ids().filter_map(skinny).collect();
-        long.sort_unstable();
-        long.dedup();
-        self.refine_edges(&long);
-        self.changed();
-        self.say(host, &format!("Edges divided: {}\n", long.len()));
-        Ok(())
-    }
-
-    /// `o`, `O`: nothing to do where at most three films, or strings, meet; else it is not supported.
-    fn pop(&mut self, host: &mut dyn Host) -> Done {
-        let around = self.surface.neighbours();
-        let over = if self.has_films() {
-            self.surface.edges.ids().filter(|&edge| around.facets[edge].len() > 3).count()
-        } else {
-            self.surface.vertices.ids().filter(|&vertex| around.edges[vertex].len() > 3).count()
-        };
-        if over > 0 {
-            let message = format!(
-                "not supported: popping ({over} places where more than three films or strings meet). \
-                 T1s of whole foams: combwright foam"
-            );
-            return Err(EvolverError::Surface(message));
-        }
-        self.say(host, "Popped: 0\n");
-        Ok(())
-    }
-}
-
-fn sum<I: Id>(a: &IndexVec<I, f64>, b: &IndexVec<I, f64>) -> IndexVec<I, f64> {
-    a.iter().zip(b.iter()).map(|(a, b)| a + b).collect()
-}
-
-/// How many facets of films turned over by more than a right angle between two states.
-fn folded_facets(surface: &crate::evolver::surface::Surface, old: &State, new: &State) -> usize {
-    if surface.representation == Representation::String {
-        return 0;
-    }
-    let normal = |state: &State, id: FacetId| {
-        let corners = surface.corners(id);
-        let at = |i: usize| state.places[corners[i].0] + surface.translation(corners[i].1);
-        (at(1) - at(0)).cross(at(2) - at(0))
-    };
-    surface
-        .facets
-        .ids()
-        .filter(|&id| surface.facets[id].tension.abs() > 0.0)
-        .filter(|&id| normal(old, id).dot(normal(new, id)) < 0.0)
-        .count()
-}
-
-/// A value below all eigenvalues that matter: probing downwards until none lies below.
-fn lowest_guess(newton: &Newton) -> Result<f64, EvolverError> {
-    let mut value = -1e-3;
-    for _ in 0..40 {
-        if newton.below(value)? == 0 {
-            return Ok(value);
-        }
-        value *= 2.0;
-    }
-    Ok(value)
-}
-
-/// The scale of least energy along a direction, either way, as Surface Evolver seeks it: a step that lowers the energy,
-/// doubled as long as that helps, then a parabola. 0 if nothing lowers it.
-fn seek(
-    energy: &dyn Fn(f64) -> Result<f64, EvolverError>,
-    base: f64,
-    most: f64,
-) -> Result<f64, EvolverError> {
-    let mut step = most / 100.0;
-    let mut sign = 0.0;
-    while step > 1e-15 {
-        let (up, down) = (energy(step)?, energy(-step)?);
-        if up < base || down < base {
-            sign = if up > down { -1.0 } else { 1.0 };
-            break;
-        }
-        step /= 10.0;
-    }
-    if is_zero(sign) {
-        return Ok(0.0);
-    }
-    let (mut s0, mut e0, mut s1, mut e1) = (0.0, base, step, energy(sign * step)?);
-    let (mut s2, mut e2) = (s1, e1);
-    while step < most {
-        step = (2.0 * step).min(most);
-        (s2, e2) = (step, energy(sign * step)?);
-        if e2 > e1 {
-            break;
-        }
-        (s0, e0, s1, e1) = (s1, e1, s2, e2);
-    }
-    if e2 <= e1 {
-        return Ok(sign * s1);
-    }
-    let denominator = e0 * (s1 - s2) + e1 * (s2 - s0) + e2 * (s0 - s1);
-    let best = ((e0 - e2) * s1 * s1 + (e1 - e0) * s2 * s2 + (e2 - e1) * s0 * s0) / 2.0 / denominator;
-    let best = if best.is_finite() { best.clamp(s0, s2) } else { s1 };
-    Ok(sign * if energy(sign * best)? <= e1 { best } else { s1 })
 }
 
 const HELP: &str = "\
 g N        N steps down the energy          r  refine        u  equiangulate    V  average vertices
 hessian    Newton step                      hessian_seek     saddle             ritz(value, count)
+slide      along the walls, as long as that lowers the energy
 v          volumes and pressures            e  counts        t l w K  threshold
 print E    printf \"…\", a, b                 list vertices where …              set edge tension 2 where …
 M 1, M 2   linear, quadratic                dump \"file.fe\"   quit

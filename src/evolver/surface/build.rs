@@ -2,11 +2,13 @@
 
 use super::{
     Body, BodyId, BoundaryId, Common, ConstraintId, Directed, Edge, EdgeId, Facet, FacetId, Gone, Surface,
-    Vertex, VertexId,
+    Vertex, VertexId, Wall, return_to,
 };
 use crate::{
     evolver::{
-        datafile::{Attributes, BodyLine, Datafile, EdgeLine, FaceLine, Representation, VertexLine},
+        datafile::{
+            Attributes, BodyLine, Constraint, Datafile, EdgeLine, FaceLine, Representation, VertexLine,
+        },
         error::EvolverError,
         language::expression::ElementKind,
         source::{Place, Position},
@@ -60,6 +62,7 @@ impl Surface {
         }
         let middles: Vec<i64> = data.edges.iter().filter_map(|edge| edge.middle).collect();
         data.vertices.iter().try_for_each(|line| builder.vertex(line, &middles))?;
+        builder.onto_constraints();
         data.edges.iter().try_for_each(|line| builder.edge(line))?;
         data.faces.iter().try_for_each(|line| builder.face(line))?;
         data.bodies.iter().try_for_each(|line| builder.body(line))?;
@@ -180,6 +183,23 @@ impl Builder<'_> {
         self.insert(&mut numbers, (line.id, line.position), ElementKind::Vertex, id)?;
         self.vertices.0 = numbers;
         Ok(())
+    }
+
+    /// Brings the vertices onto their constraints: the middles of faces are those of the places after that. What does not
+    /// get there is found when the surface is first used.
+    fn onto_constraints(&mut self) {
+        let bind = |constraint: &Constraint| Wall {
+            formula: constraint.formula.bind(&self.data.variables),
+            side: constraint.side,
+        };
+        let walls: IndexVec<ConstraintId, Wall> = self.data.constraints.iter().map(bind).collect();
+        for vertex in self.surface.vertices.as_mut_slice() {
+            let own = vertex.common.constraints.iter().map(|&id| &walls[id]);
+            let returned = return_to(own, 0, vertex.position);
+            if returned.finite && vertex.common.boundary.is_none() {
+                vertex.position = returned.place;
+            }
+        }
     }
 
     fn edge(&mut self, line: &EdgeLine) -> Result<(), EvolverError> {

@@ -239,15 +239,16 @@ impl Surface {
             let (u, v) = tangent.any_orthonormal_pair();
             return Some(vec![u, v]);
         }
-        let facets = neighbours.facets_at(id);
-        let start = self.area_vector(*facets.first()?);
-        let sum: DVec3 = facets
+        let sum = neighbours
+            .facets_at(id)
             .iter()
-            .map(|&facet| {
-                let area = self.area_vector(facet);
-                if area.dot(start) < 0.0 { -area } else { area }
-            })
-            .sum();
+            .map(|&facet| self.area_vector(facet))
+            .fold(DVec3::ZERO, one_sided);
         Some(sum.try_normalize().into_iter().collect())
     }
+}
+
+/// The sum with one more vector, turned to the side of the sum: neighbouring facets may be turned round.
+pub(crate) fn one_sided(sum: DVec3, next: DVec3) -> DVec3 {
+    if sum.dot(next) < 0.0 { sum - next } else { sum + next }
 }

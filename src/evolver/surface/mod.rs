@@ -10,17 +10,21 @@
 //! | refinement; linear and quadratic elements | `refine.rs` |
 //! | swaps of edges, averages of vertices | `improve.rs` |
 //! | removal of short edges and small facets | `collapse.rs` |
+//! | places brought back onto their constraints | `constrain.rs` |
 
 mod build;
 mod check;
 mod collapse;
+mod constrain;
 mod images;
 mod improve;
 mod neighbours;
 mod refine;
 
 pub use check::{Fault, check};
+pub(crate) use constrain::{Wall, multipliers, return_to};
 pub(crate) use images::body_images;
+pub(crate) use improve::one_sided;
 pub(crate) use neighbours::Neighbours;
 
 use super::datafile::{ExtraAttribute, Model, Representation};
@@ -258,6 +262,9 @@ impl Surface {
     /// The area vector of a facet from its corners: half the sum of cross products.
     #[must_use]
     pub fn area_vector(&self, facet: FacetId) -> DVec3 {
+        if let [a, b, _] = self.facets[facet].edges[..] {
+            return 0.5 * self.side(a).cross(self.side(b));
+        }
         let count = self.facets[facet].edges.len();
         let places: Vec<DVec3> =
             self.corners(facet)[..count].iter().map(|&corner| self.place(corner)).collect();

@@ -4,32 +4,36 @@
 //! For systems that are not made of films; a complex has its own layout (`layout.rs`).
 
 use super::sparse::FactorError;
+use crate::index::checked_u32;
 use faer::{
     Conj, MatMut, Par, Side,
     dyn_stack::{MemBuffer, MemStack},
     sparse::{
-        Argsort, Pair, SparseColMat, SymbolicSparseColMat,
+        SparseColMatRef, SymbolicSparseColMat,
         linalg::cholesky::{
             CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
             factorize_symbolic_cholesky, supernodal::SupernodalLdltRef,
         },
     },
 };
+use std::sync::Arc;
 
 /// The places of the entries of a matrix and the order in which it is factored.
 #[derive(Debug)]
 pub(crate) struct SymmetricPattern {
+    entries: Vec<(u32, u32)>,
+    /// Where each entry is summed.
+    places: Vec<u32>,
     pattern: SymbolicSparseColMat<usize>,
-    order: Argsort<usize>,
     cholesky: SymbolicCholesky<usize>,
     size: usize,
 }
 
 /// A factored matrix.
 #[derive(Debug)]
-pub(crate) struct SymmetricFactor<'a> {
-    pattern: &'a SymmetricPattern,
-    matrix: SparseColMat<usize, f64>,
+pub(crate) struct SymmetricFactor {
+    pattern: Arc<SymmetricPattern>,
+    matrix: Vec<f64>,
     values: Vec<f64>,
     /// The number of negative pivots.
     pub(crate) negative: usize,
@@ -37,6 +41,9 @@ pub(crate) struct SymmetricFactor<'a> {
 
 /// Steps of iterative refinement: each gains the digits that pivoting would have saved.
 const REFINEMENTS: usize = 3;
+
+/// The residual, relative to the right side, at which a solution is as good as rounding lets it be.
+const REFINED: f64 = 1e-15;
 
 /// What is taken off a zero diagonal, as a part of the largest entry: refinement restores ten digits at a step.
 const SOFTENING: f64 = 1e-10;
@@ -49,12 +56,10 @@ impl SymmetricPattern {
     ///
     /// # Errors
     /// [`FactorError::Memory`].
-    pub(crate) fn new(size: usize, entries: &[(u32, u32)]) -> Result<Self, FactorError> {
+    pub(crate) fn new(size: usize, entries: Vec<(u32, u32)>) -> Result<Self, FactorError> {
         let memory = FactorError::Memory { unknowns: size };
-        let pairs: Vec<Pair<usize, usize>> =
-            entries.iter().map(|&(row, column)| Pair::new(row as usize, column as usize)).collect();
-        let (pattern, order) =
-            SymbolicSparseColMat::try_new_from_indices(size, size, &pairs).map_err(|_| memory)?;
+        let (starts, rows, places) = by_columns(size, &entries);
+        let pattern = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
         let cholesky = factorize_symbolic_cholesky(
             pattern.as_ref(),
             Side::Lower,
@@ -62,26 +67,33 @@ impl SymmetricPattern {
             CholeskySymbolicParams::default(),
         )
         .map_err(|_| memory)?;
-        Ok(Self { pattern, order, cholesky, size })
+        Ok(Self { entries, places, pattern, cholesky, size })
+    }
+
+    /// Whether this is the pattern of these entries.
+    pub(crate) fn fits(&self, size: usize, entries: &[(u32, u32)]) -> bool {
+        self.size == size && self.entries == entries
     }
 
     /// Factors the matrix with these values, in the order of the entries of the pattern.
     ///
     /// # Errors
     /// [`FactorError`] if a pivot vanishes or memory is short.
-    pub(crate) fn factor(&self, entries: &[f64]) -> Result<SymmetricFactor<'_>, FactorError> {
+    pub(crate) fn factor(self: &Arc<Self>, entries: &[f64]) -> Result<SymmetricFactor, FactorError> {
         let memory = FactorError::Memory { unknowns: self.size };
-        let matrix =
-            SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, entries).map_err(|_| memory)?;
+        let mut matrix = vec![0.0; self.pattern.row_idx().len()];
+        for (&place, value) in self.places.iter().zip(entries) {
+            matrix[place as usize] += value;
+        }
         let parallel = if self.size >= PARALLEL { Par::rayon(0) } else { Par::Seq };
         let mut values = vec![0.0; self.cholesky.len_val()];
         let scratch = self.cholesky.factorize_numeric_ldlt_scratch::<f64>(parallel, Default::default());
         let mut buffer = MemBuffer::try_new(scratch).map_err(|_| memory)?;
-        let mut factor = |matrix: &SparseColMat<usize, f64>| {
+        let mut factor = |matrix: &[f64]| {
             self.cholesky
                 .factorize_numeric_ldlt(
                     &mut values,
-                    matrix.as_ref(),
+                    SparseColMatRef::new(self.pattern.as_ref(), matrix),
                     Side::Lower,
                     Default::default(),
                     parallel,
@@ -91,10 +103,31 @@ impl SymmetricPattern {
                 .map(|_| ())
         };
         factor(&matrix)
-            .or_else(|_| factor(&softened(&matrix)))
+            .or_else(|_| factor(&self.softened(&matrix)))
             .map_err(|_| FactorError::Singular { unknowns: self.size })?;
         let negative = self.negative_pivots(&values);
-        Ok(SymmetricFactor { pattern: self, matrix, values, negative })
+        Ok(SymmetricFactor { pattern: Arc::clone(self), matrix, values, negative })
+    }
+
+    /// The places of a column's entries, and their rows; the diagonal comes first where there is one.
+    fn column(&self, column: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let range = self.pattern.col_ptr()[column]..self.pattern.col_ptr()[column + 1];
+        range.clone().zip(self.pattern.row_idx()[range].iter().copied())
+    }
+
+    /// For a matrix whose order puts a zero diagonal first, as those of multipliers are: a small part of the largest entry
+    /// is taken off each. Refinement takes the true matrix.
+    fn softened(&self, matrix: &[f64]) -> Vec<f64> {
+        let largest = matrix.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+        let mut softened = matrix.to_vec();
+        for column in 0..self.size {
+            for (place, row) in self.column(column) {
+                if row == column && matrix[place].abs() <= 0.0 {
+                    softened[place] -= SOFTENING * largest;
+                }
+            }
+        }
+        softened
     }
 
     fn negative_pivots(&self, values: &[f64]) -> usize {
@@ -117,24 +150,42 @@ impl SymmetricPattern {
     }
 }
 
-/// For a matrix whose order puts a zero diagonal first, as those of multipliers are: a small part of the largest entry is
-/// taken off each. Refinement takes the true matrix.
-fn softened(matrix: &SparseColMat<usize, f64>) -> SparseColMat<usize, f64> {
-    let largest = matrix.val().iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-    let mut softened = matrix.clone();
-    let zeros: Vec<usize> = (0..matrix.ncols())
-        .flat_map(|column| matrix.col_ptr()[column]..matrix.col_ptr()[column + 1])
-        .zip(matrix.triplet_iter())
-        .filter(|(_, entry)| entry.row == entry.col && entry.val.abs() <= 0.0)
-        .map(|(at, _)| at)
-        .collect();
-    for at in zeros {
-        softened.val_mut()[at] -= SOFTENING * largest;
+/// Starts of the columns, rows in them in order, and where each entry goes.
+fn by_columns(size: usize, entries: &[(u32, u32)]) -> (Vec<usize>, Vec<usize>, Vec<u32>) {
+    let mut ends = vec![0; size + 1];
+    for &(_, column) in entries {
+        ends[column as usize + 1] += 1;
     }
-    softened
+    for column in 0..size {
+        ends[column + 1] += ends[column];
+    }
+    let mut sorted = vec![(0, 0); entries.len()];
+    let mut next = ends.clone();
+    for (at, &(row, column)) in entries.iter().enumerate() {
+        let place = &mut next[column as usize];
+        sorted[*place] = (row, at);
+        *place += 1;
+    }
+    let (mut starts, mut rows) = (Vec::with_capacity(size + 1), Vec::with_capacity(entries.len()));
+    let mut places = vec![0; entries.len()];
+    starts.push(0);
+    for column in 0..size {
+        let own = &mut sorted[ends[column]..ends[column + 1]];
+        own.sort_unstable();
+        let mut last = None;
+        for &(row, at) in own.iter() {
+            if last != Some(row) {
+                rows.push(row as usize);
+                last = Some(row);
+            }
+            places[at] = checked_u32(rows.len() - 1);
+        }
+        starts.push(rows.len());
+    }
+    (starts, rows, places)
 }
 
-impl SymmetricFactor<'_> {
+impl SymmetricFactor {
     /// The solution for one right side; not finite numbers where the matrix is as good as singular.
     ///
     /// # Errors
@@ -147,6 +198,7 @@ impl SymmetricFactor<'_> {
         let mut solution = vec![0.0; size];
         let mut residual = rhs.to_vec();
         let mut left = f64::INFINITY;
+        let enough = REFINED * REFINED * rhs.iter().map(|x| x * x).sum::<f64>();
         for _ in 0..=REFINEMENTS {
             let mut correction = residual.clone();
             factor.solve_in_place_with_conj(
@@ -162,6 +214,9 @@ impl SymmetricFactor<'_> {
                 break;
             }
             (solution, residual, left) = (candidate, next, length);
+            if left <= enough {
+                break;
+            }
         }
         Ok(solution)
     }
@@ -169,10 +224,13 @@ impl SymmetricFactor<'_> {
     /// What is left of `rhs` when the matrix times `x` is taken away.
     pub(crate) fn residual(&self, rhs: &[f64], x: &[f64]) -> Vec<f64> {
         let mut residual = rhs.to_vec();
-        for entry in self.matrix.triplet_iter() {
-            residual[entry.row] -= entry.val * x[entry.col];
-            if entry.row != entry.col {
-                residual[entry.col] -= entry.val * x[entry.row];
+        for column in 0..self.pattern.size {
+            for (place, row) in self.pattern.column(column) {
+                let value = self.matrix[place];
+                residual[row] -= value * x[column];
+                if row != column {
+                    residual[column] -= value * x[row];
+                }
             }
         }
         residual
@@ -186,9 +244,10 @@ mod tests {
     #[test]
     fn an_indefinite_system_is_solved_and_its_inertia_counted() {
         // [[2, 1, 1], [1, 3, 0], [1, 0, 0]]: a saddle with one negative pivot.
-        let entries = [(0, 0), (1, 0), (2, 0), (1, 1), (2, 2)];
-        let pattern = SymmetricPattern::new(3, &entries).unwrap();
-        let factor = pattern.factor(&[2.0, 1.0, 1.0, 3.0, 0.0]).unwrap();
+        let entries = vec![(0, 0), (1, 0), (2, 0), (1, 1), (2, 2), (0, 0)];
+        let pattern = Arc::new(SymmetricPattern::new(3, entries).unwrap());
+        // The first entry in two parts.
+        let factor = pattern.factor(&[1.5, 1.0, 1.0, 3.0, 0.0, 0.5]).unwrap();
         assert_eq!(factor.negative, 1);
         let x = factor.solve(&[4.0, 4.0, 1.0]).unwrap();
         // x = (1, 1, 1): checked by hand.

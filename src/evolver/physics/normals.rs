@@ -1,0 +1,99 @@
+//! The normals along which Newton steps move vertices: across films, and across lines where films meet.
+
+use super::freedom::Directions;
+use crate::{
+    evolver::{
+        datafile::Representation,
+        surface::{Directed, EdgeId, FacetId, Neighbours, Surface, VertexId, one_sided},
+    },
+    index::IndexVec,
+};
+use glam::DVec3;
+
+/// The normals at each vertex: one within a film, two where three films meet along a line, `None` (all directions) where
+/// lines meet.
+pub(super) fn normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Directions>> {
+    match surface.representation {
+        Representation::Soapfilm => film_normals(surface, neighbours),
+        Representation::String => string_normals(surface, neighbours),
+    }
+}
+
+fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Directions>> {
+    let areas: IndexVec<FacetId, DVec3> = surface.facets.ids().map(|id| surface.area_vector(id)).collect();
+    // Neighbouring facets may be turned round: each is counted to the side of those before.
+    let mut sums = IndexVec::from_elem(DVec3::ZERO, surface.vertices.len());
+    for (id, facet) in surface.facets.enumerated() {
+        for &directed in &facet.edges {
+            let sum = &mut sums[surface.tail(directed)];
+            *sum = one_sided(*sum, areas[id]);
+        }
+    }
+    let mut middles: IndexVec<VertexId, Option<EdgeId>> = IndexVec::from_elem(None, surface.vertices.len());
+    for (id, edge) in surface.edges.enumerated() {
+        let Some(middle) = edge.middle else { continue };
+        middles[middle] = Some(id);
+        sums[middle] =
+            neighbours.facets[id].iter().map(|&(facet, _)| areas[facet]).fold(DVec3::ZERO, one_sided);
+    }
+    let normal_at = |id: VertexId| {
+        let around: &[EdgeId] = match &middles[id] {
+            Some(edge) => std::slice::from_ref(edge),
+            None => &neighbours.edges[id],
+        };
+        if around.iter().all(|&edge| neighbours.facets[edge].is_empty()) {
+            return None;
+        }
+        let is_line = |edge: &EdgeId| neighbours.facets[*edge].len() > 2;
+        if around.iter().any(is_line) {
+            let lines: Vec<EdgeId> = around.iter().copied().filter(is_line).collect();
+            return (lines.len() <= 2).then(|| line_normals(surface, id, &lines));
+        }
+        sums[id].try_normalize().map(|normal| Directions::of(&[normal]))
+    };
+    surface.vertices.ids().map(normal_at).collect()
+}
+
+/// The two directions across the line that a vertex lies on.
+fn line_normals(surface: &Surface, vertex: VertexId, lines: &[EdgeId]) -> Directions {
+    let outward = |edge: EdgeId| {
+        let reversed = surface.edges[edge].ends[0] != vertex;
+        surface.side(Directed { edge, reversed })
+    };
+    let middle = surface.vertices[vertex].middle;
+    let tangent = match lines {
+        [a, b] if !middle => outward(*a) - outward(*b),
+        [a, ..] => surface.side(Directed { edge: *a, reversed: false }),
+        [] => DVec3::ZERO,
+    };
+    let Some(tangent) = tangent.try_normalize() else { return Directions::of(&DVec3::AXES) };
+    let (u, v) = tangent.any_orthonormal_pair();
+    Directions::of(&[u, v])
+}
+
+fn string_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Directions>> {
+    let mut tangents: IndexVec<VertexId, Option<DVec3>> = IndexVec::from_elem(None, surface.vertices.len());
+    for (id, edge) in surface.edges.enumerated() {
+        if let Some(middle) = edge.middle {
+            tangents[middle] = Some(surface.side(Directed { edge: id, reversed: false }));
+        }
+    }
+    for vertex in surface.vertices.ids() {
+        if let [a, b] = neighbours.edges[vertex][..] {
+            let outward =
+                |edge| surface.side(Directed { edge, reversed: surface.edges[edge].ends[0] != vertex });
+            tangents[vertex] = Some(outward(a) - outward(b));
+        }
+    }
+    tangents
+        .into_iter()
+        .map(|tangent| {
+            let tangent = (*tangent)?.try_normalize()?;
+            if surface.dimension == 2 {
+                return Some(Directions::of(&[DVec3::Z.cross(tangent)]));
+            }
+            let (u, v) = tangent.any_orthonormal_pair();
+            Some(Directions::of(&[u, v]))
+        })
+        .collect()
+}
