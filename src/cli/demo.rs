@@ -2,20 +2,15 @@
 
 use super::{
     CliError,
-    demo_comb::{self, View},
-    foam_relax::{self, Begin, Job, Keeper, Made},
-    foam_run,
-    foam_settings::{FoamSettings, Stage, space_of},
+    demo_comb::{self, Block, UNIT_CELLS, View},
+    demo_foam::{self, Foams},
+    foam_settings::space_of,
     interrupt, progress,
 };
 use crate::{
     compare::{self, Comparison, Sample},
     enclosure::{Design, Enclosure, Inspection, Recipe},
-    foam::{
-        relax::{RelaxSettings, Stop},
-        seeds::SeedSettings,
-    },
-    mesh,
+    mesh::{self, Grid, march},
     report::{
         Scene, comb as comb_output, compare_files,
         figure::png,
@@ -24,10 +19,9 @@ use crate::{
         page::{PAGE_NAME, Page},
         page_photo, write_comb_vtp,
     },
-    surface::Gap,
+    surface::{Gap, WallSide},
 };
 use anyhow::anyhow;
-use glam::DVec3;
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use std::{
@@ -42,16 +36,23 @@ const RECIPE: &str = include_str!("demo.toml");
 /// What `README.txt` says.
 const README: &str = include_str!("demo_readme.txt");
 
-/// The most cells: beyond this it is no demo.
-const MOST_CELLS: usize = 2000;
+/// The fewest cells: with 64, each bends so far round the wall that no seven together can be seen. And the most: beyond this it
+/// is no demo.
+const CELLS: std::ops::RangeInclusive<usize> = 128..=512;
+
+/// Photographs that the page shows; all are in the folder.
+const SHOWN_PHOTOS: usize = 4;
+
+/// Samples of the wall per period, where it only carries the comb's cells in a picture.
+const WALL_SAMPLES: usize = 24;
 
 /// An enclosure, the foam in its gap, a synthetic comb on its wall, photographs, their reading, the comparison, and one page.
 ///
-/// Takes about half a minute. The page needs no server and no network: open it, or run combwright view.
+/// Takes about half a minute with 256 cells. The page needs no server and no network: open it, or run combwright view.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  combwright demo -o out\n  combwright view out")]
 pub(super) struct DemoArguments {
-    /// Cells of the foam, and of the comb
+    /// Cells of foam, and of comb, in a unit cell of the surface: 128 to 512
     #[arg(short = 'n', long, value_name = "N", default_value_t = 256)]
     cells: usize,
     /// Where the random numbers start
@@ -67,10 +68,13 @@ pub(super) struct DemoArguments {
 
 /// Runs the command.
 pub(super) fn run(arguments: &DemoArguments) -> Result<(), CliError> {
-    if !(64..=MOST_CELLS).contains(&arguments.cells) {
+    if !CELLS.contains(&arguments.cells) {
         return Err(CliError::mistake(anyhow!(
-            "--cells {} is out of range: 64 to {MOST_CELLS}; with fewer the photographs show too few complete cells",
-            arguments.cells
+            "--cells {} is out of range: {} to {}; with fewer each cell bends too far round the wall to be read from a photograph, \
+             with more it takes minutes",
+            arguments.cells,
+            CELLS.start(),
+            CELLS.end()
         )));
     }
     let threads = rayon::ThreadPoolBuilder::new().num_threads(arguments.jobs.unwrap_or(0)).build();
@@ -82,6 +86,7 @@ struct Demo<'a> {
     folder: OutputFolder,
     design: Design,
     gap: Gap,
+    block: Block,
     seconds: Vec<(&'static str, f64)>,
 }
 
@@ -92,15 +97,16 @@ impl<'a> Demo<'a> {
         let recipe = Recipe::parse(RECIPE).map_err(CliError::failure)?;
         let design = Design::new(&recipe).map_err(CliError::failure)?;
         let gap = space_of(&design).gap().map_err(CliError::failure)?;
-        Ok(Self { arguments, folder, design, gap, seconds: Vec::new() })
+        let block = Block { period: design.period.0 };
+        Ok(Self { arguments, folder, design, gap, block, seconds: Vec::new() })
     }
 
     fn run(mut self) -> Result<(), CliError> {
         let enclosure = self.enclosure()?;
-        let (job, made) = self.foam()?;
+        let foams = self.foam()?;
         let views = self.photographs()?;
-        let (comparison, samples) = self.comparison(&made, &views)?;
-        self.page(&enclosure, &job, &made, &views, &comparison)?;
+        let (comparison, samples) = self.comparison(&foams, &views)?;
+        self.page(&enclosure, &foams, &views, &comparison)?;
         self.write_comparison(&comparison, &samples)?;
         self.folder.enter("");
         self.folder.write_bytes("README.txt", README.as_bytes())?;
@@ -172,74 +178,37 @@ impl<'a> Demo<'a> {
         })
     }
 
-    fn foam(&mut self) -> Result<(Job, Made), CliError> {
-        let settings = self.foam_settings();
+    fn foam(&mut self) -> Result<Foams, CliError> {
         self.stage("foam", 1000, |demo, bar| {
-            let start = foam_run::started(&settings, &demo.gap, bar)?;
-            let network =
-                start.network.ok_or_else(|| CliError::failure(anyhow!("the partition gave no network")))?;
-            let job = Job::new(&settings, start.seeds.psi6);
-            let mut keeper = Keeper::new(&job, bar, None, Vec::new());
-            let relaxed = keeper.relax(Begin::Network(network), &demo.gap)?;
-            let made = Made::new(&job, &demo.gap, relaxed, keeper.record)?;
-            demo.folder.enter("foam");
-            foam_relax::write_all(
-                &mut demo.folder,
-                &job,
-                &settings,
-                &demo.gap,
-                &made,
-                Some(&start.seeds),
-                Vec::new(),
-            )?;
-            let sides = foam_run::by_sides(&made.figures.side_counts);
-            let said = format!(
-                "{} cells ({sides}), {}",
-                made.figures.cells,
-                foam_relax::in_words(made.figures.ended)
-            );
-            match made.figures.ended {
-                Stop::Converged { .. } => Ok(((job, made), said)),
-                stop => Err(CliError::failure(anyhow!(
-                    "the demo's foam is {}; try another --seed",
-                    foam_relax::in_words(stop)
-                ))),
-            }
+            let DemoArguments { cells, seed, .. } = *demo.arguments;
+            let space = space_of(&demo.design);
+            let foams = demo_foam::make(space, cells, seed, &demo.gap, &mut demo.folder, bar)?;
+            let said = foams.in_words();
+            Ok((foams, said))
         })
-    }
-
-    fn foam_settings(&self) -> FoamSettings {
-        FoamSettings {
-            space: space_of(&self.design),
-            seeds: SeedSettings::new(self.arguments.cells, self.arguments.seed),
-            relax: RelaxSettings::default(),
-            last_stage: Stage::Foam,
-            runs: 1,
-            anneal: 0,
-            extrapolate: false,
-            jobs: None,
-            write_fe: None,
-            output: PathBuf::new(),
-        }
     }
 
     fn photographs(&mut self) -> Result<Vec<View>, CliError> {
         self.stage("photographs", 9, |demo, bar| {
-            let seeds = demo_comb::comb_seeds(demo.arguments.cells, demo.arguments.seed);
-            let domain = space_of(&demo.design).domain().map_err(CliError::failure)?;
-            let comb = demo_comb::comb_on_wall(&demo.gap, &domain, &seeds, demo.design.period.0)?;
+            let seeds = Block::seeds(demo.arguments.cells, demo.arguments.seed);
+            let comb = demo.block.comb(&demo.gap, &seeds)?;
             bar.inc(1);
-            let views = demo_comb::photograph(&comb, &demo.gap, &demo.design, demo.arguments.seed, bar)?;
-            for view in &views {
+            let photographs = demo_comb::photograph(&comb, &demo.gap, demo.block, demo.arguments.seed, bar)?;
+            for view in &photographs.views {
                 demo.write_view(view)?;
             }
-            let read: usize = views.iter().map(|view| view.comb.pattern.complete().count()).sum();
-            let counted: usize = views.iter().map(|view| view.on_wall.complete().count()).sum();
-            let said = format!(
-                "{} views, {read} complete cells read, {counted} after each is counted once",
-                views.len()
-            );
-            Ok((views, said))
+            for unread in &photographs.unread {
+                demo.folder.enter(&format!("comb/{}", unread.name));
+                demo.folder.write_bytes("photo.png", &png(&unread.picture)?)?;
+                demo.folder.write_bytes("unread.txt", format!("{}\n", unread.reason).as_bytes())?;
+            }
+            if photographs.views.is_empty() {
+                return Err(CliError::failure(anyhow!(
+                    "none of the photographs shows enough comb; try another --seed or more --cells"
+                )));
+            }
+            let said = photographs.in_words();
+            Ok((photographs.views, said))
         })
     }
 
@@ -257,7 +226,7 @@ impl<'a> Demo<'a> {
 
     fn comparison(
         &mut self,
-        made: &Made,
+        foams: &Foams,
         views: &[View],
     ) -> Result<(Comparison, [Vec<Sample>; 2]), CliError> {
         self.stage("comparison", 1, |demo, _| {
@@ -265,7 +234,7 @@ impl<'a> Demo<'a> {
                 .iter()
                 .map(|view| Sample { name: view.name.clone(), pattern: view.on_wall.clone() })
                 .collect();
-            let foam = vec![Sample { name: "foam".to_owned(), pattern: made.pattern.clone() }];
+            let foam = foams.samples.clone();
             let settings = compare::Settings { seed: demo.arguments.seed, ..compare::Settings::default() };
             let samples: [Vec<Sample>; 2] = [comb, foam];
             let comparison =
@@ -294,30 +263,23 @@ impl<'a> Demo<'a> {
     fn page(
         &mut self,
         enclosure: &Enclosure,
-        job: &Job,
-        made: &Made,
+        foams: &Foams,
         views: &[View],
         comparison: &Comparison,
     ) -> Result<(), CliError> {
         self.stage("page", 1, |demo, _| {
-            let photos = views.iter().map(|view| {
+            let photos = views.iter().take(SHOWN_PHOTOS).map(|view| {
                 let complete = view.comb.pattern.complete().count();
                 page_photo(&view.comb, &view.photo, format!("{}: {complete} complete cells", view.name))
             });
             let page = Page {
                 title: "Comb against foam between two walls".to_owned(),
-                subtitle: format!(
-                    "A demonstration: the foam is real, the comb is drawn. {} cells each on the walls Φ = ±{} of a P-surface of \
-                     period {} mm; comb photographed from eight corners and read by combwright.",
-                    demo.arguments.cells,
-                    demo.design.recipe.gap.delta.unwrap_or(0.0),
-                    demo.design.period.0
-                ),
+                subtitle: demo.subtitle(views.len()),
                 comparison,
-                scenes: demo.scenes(enclosure, made, views),
+                scenes: demo.scenes(enclosure, foams, views)?,
                 photos: photos.collect::<Result<_, _>>()?,
                 unit: "mm".to_owned(),
-                settings: demo.settings(job, views, comparison),
+                settings: demo.settings(foams, views, comparison),
             };
             let html = page.html().map_err(CliError::failure)?;
             demo.folder.enter("");
@@ -326,15 +288,28 @@ impl<'a> Demo<'a> {
         })
     }
 
-    fn scenes(&self, enclosure: &Enclosure, made: &Made, views: &[View]) -> Vec<Scene> {
+    fn subtitle(&self, photographs: usize) -> String {
+        format!(
+            "A demonstration: the foam is real, the comb is drawn. {} cells in each unit cell of period {} mm, on the walls \
+             Φ = ±{} of a P-surface; the comb covers {UNIT_CELLS} × {UNIT_CELLS} × {UNIT_CELLS} of them, and {photographs} photographs of it from the corners were read by \
+             combwright.",
+            self.arguments.cells,
+            self.design.period.0,
+            self.design.recipe.gap.delta.unwrap_or(0.0),
+        )
+    }
+
+    fn scenes(&self, enclosure: &Enclosure, foams: &Foams, views: &[View]) -> Result<Vec<Scene>, CliError> {
+        let made = &foams.made;
         let surface = pieces(&made.relaxed.state, &self.gap);
         let patterns: Vec<_> = views.iter().map(|view| (&view.on_wall, view.outlines.clone())).collect();
-        // The shells' frame has the box's corner over the origin and the legs' ends on z = 0.
-        let depth = self.design.recipe.base.groove * DVec3::Z;
-        let back = self.design.period.0 * self.design.region.low() - depth;
-        let [inner, _] = &enclosure.fronts;
-        let wall = inner.clone().map(|p| p + back);
-        vec![
+        let extent = self.block.extent();
+        let cells = [WALL_SAMPLES * UNIT_CELLS as usize; 3];
+        let wall = self.gap.wall(WallSide::Lower);
+        let wall =
+            march(wall.field.as_ref(), wall.level, &Grid { low: extent.low, high: extent.high, cells })
+                .map_err(CliError::failure)?;
+        Ok(vec![
             Scene::foam(
                 &surface,
                 &made.cells,
@@ -345,20 +320,21 @@ impl<'a> Demo<'a> {
                 &wall,
                 &patterns,
                 0.002 * self.design.period.0,
-                "The comb, as read from the photographs and mapped onto the inner shell.".to_owned(),
+                "The comb, as read from the photographs and mapped onto the inner wall.".to_owned(),
             ),
             Scene::enclosure(enclosure, "The enclosure: inner and outer shell on their base.".to_owned()),
-        ]
+        ])
     }
 
     /// Everything that the page follows from, without times.
-    fn settings(&self, job: &Job, views: &[View], comparison: &Comparison) -> Value {
+    fn settings(&self, foams: &Foams, views: &[View], comparison: &Comparison) -> Value {
+        let job = &foams.job;
         json!({
             "version": env!("CARGO_PKG_VERSION"),
             "seed": self.arguments.seed,
             "enclosure": self.design.recipe,
-            "foam": { "space": job.space, "seeds": job.seeds, "relaxation": job.relax },
-            "comb": demo_comb::comb_seeds(self.arguments.cells, self.arguments.seed),
+            "foam": { "space": job.space, "seeds": job.seeds, "relaxation": job.relax, "foams": foams.samples.len() },
+            "comb": { "unit_cells_along_an_edge": UNIT_CELLS, "places": Block::seeds(self.arguments.cells, self.arguments.seed) },
             "cameras": views.iter().map(|view| json!({ "name": view.name, "eye_mm": view.camera.centre, "focal_px": view.camera.focal })).collect::<Vec<_>>(),
             "comparison": comparison.settings,
         })

@@ -25,6 +25,7 @@ mod compare;
 mod compare_wall;
 mod demo;
 mod demo_comb;
+mod demo_foam;
 mod enclosure;
 mod evolver;
 mod foam;

@@ -1,6 +1,6 @@
 //! From photographs of comb to cells and their numbers of sides.
 //!
-//! **Enters** a photograph of built comb, of any size, light and wall colour, at 12 to 200 pixels per cell. **Leaves**
+//! **Enters** a photograph of built comb, of any size, light and wall colour, at 12 to 640 pixels per cell. **Leaves**
 //! [`Comb`]: the [`CellPattern`] in pixels, each cell with its number of sides, status and confidence, and its outline.
 //! Nothing is tuned per photograph.
 //!
@@ -66,7 +66,7 @@ pub use comb_pattern::CellDetail;
 pub use corrections::{Correction, CorrectionError, Corrections};
 pub use photo::{MAX_PIXELS, Part, Photo, PhotoError};
 pub use pitch::Polarity;
-pub use read::LEAST_PITCH;
+pub use read::{GREATEST_PITCH, LEAST_PITCH};
 pub use score::{Score, Truth, TruthCell, TruthError, Wrong, score};
 pub use table::{CellRow, TableError, read_cells, write_cells};
 
@@ -132,9 +132,8 @@ pub struct Comb {
 pub enum CombError {
     /// Nothing in it looks like comb.
     #[error(
-        "no comb found: nothing in the photograph looks like a hexagonal lattice of {} to 320 px pitch; \
-         if there is comb in it, say where by --roi or how large its cells are by --pitch",
-        LEAST_PITCH
+        "no comb found: nothing in the photograph looks like a hexagonal lattice of {LEAST_PITCH} to {GREATEST_PITCH} px \
+         pitch; if there is comb in it, say where by --roi or how large its cells are by --pitch"
     )]
     NoComb,
     /// The cells are too small.
@@ -179,7 +178,7 @@ pub enum CombError {
         height: usize,
     },
     /// The pitch asked for makes no sense.
-    #[error("a pitch of {pitch} px is not between {LEAST_PITCH} and 320 px")]
+    #[error("a pitch of {pitch} px is not between {LEAST_PITCH} and {GREATEST_PITCH} px")]
     Pitch {
         /// What was asked for.
         pitch: f64,
@@ -199,7 +198,7 @@ pub enum CombError {
 pub fn read(photo: &Photo, settings: &Settings) -> Result<Comb, CombError> {
     let part = part_of(photo, settings)?;
     check_mask(photo, settings)?;
-    if let Some(pitch) = settings.pitch.filter(|p| !(LEAST_PITCH..=320.0).contains(p)) {
+    if let Some(pitch) = settings.pitch.filter(|p| !(LEAST_PITCH..=GREATEST_PITCH).contains(p)) {
         return Err(CombError::Pitch { pitch });
     }
     let pyramid = Pyramid::of(photo, part);

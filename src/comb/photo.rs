@@ -1,8 +1,11 @@
 //! Reading a photograph.
 
-use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageReader, Limits, Rgb, RgbImage};
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb, RgbImage};
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// The largest photograph that is read, in pixels.
 pub const MAX_PIXELS: u64 = 100_000_000;
@@ -25,6 +28,12 @@ pub enum PhotoError {
         path: PathBuf,
         /// What the decoder said.
         source: image::ImageError,
+    },
+    /// The file ends before the picture does.
+    #[error("{path} is cut short: the picture's end is missing; copy the file again")]
+    CutShort {
+        /// The file.
+        path: PathBuf,
     },
     /// The picture is larger than is read.
     #[error("{path} is {width} x {height} px, more than the {} million that are read; scale it down", MAX_PIXELS / 1_000_000)]
@@ -59,6 +68,10 @@ impl Photo {
         let open = |source| PhotoError::Open { path: path.to_owned(), source };
         let decode = |source| PhotoError::Decode { path: path.to_owned(), source };
         let mut reader = ImageReader::open(path).map_err(open)?.with_guessed_format().map_err(open)?;
+        // The decoder fills what is missing of a JPEG with grey, and says nothing.
+        if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_ends(&fs::read(path).map_err(open)?) {
+            return Err(PhotoError::CutShort { path: path.to_owned() });
+        }
         let mut limits = Limits::default();
         limits.max_alloc = Some(MAX_PIXELS * 16);
         reader.limits(limits);
@@ -135,6 +148,27 @@ impl Photo {
     }
 }
 
+/// Whether a JPEG holds the end of its picture. Segments, which may hold smaller pictures, are skipped up to the first scan, after
+/// which a marker of the end can be nothing else (ITU-T T.81, annex B).
+fn jpeg_ends(bytes: &[u8]) -> bool {
+    const SCAN: u8 = 0xda;
+    const END: [u8; 2] = [0xff, 0xd9];
+    let mut at = 2;
+    while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {
+        // Fill bytes may stand before a marker.
+        if marker == 0xff {
+            at += 1;
+            continue;
+        }
+        at += 2 + usize::from(u16::from_be_bytes([high, low]));
+        if marker == SCAN {
+            return bytes.get(at..).is_some_and(|scan| scan.windows(2).any(|pair| pair == END));
+        }
+    }
+    // What breaks off before the first scan is refused by the decoder.
+    true
+}
+
 /// Red, green and blue in turn.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Samples<'a> {
@@ -184,4 +218,34 @@ pub struct Part {
     pub width: usize,
     /// Rows.
     pub height: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error;
+
+    #[test]
+    fn a_jpeg_that_is_cut_short_is_refused() -> Result<(), Box<dyn Error>> {
+        let home = tempfile::tempdir()?;
+        let path = home.path().join("photo.jpg");
+        let picture =
+            RgbImage::from_fn(
+                160,
+                120,
+                |x, y| Rgb([x, y, x ^ y].map(|v| u8::try_from(v % 256).unwrap_or(0))),
+            );
+        picture.save(&path)?;
+        let whole = fs::read(&path)?;
+        // A smaller picture in a segment, as cameras put it there, ends before the picture does.
+        let thumbnail = [&[0xff, 0xe1, 0, 8, 0xff, 0xd8, 0xff, 0xd9, 0, 0][..], &whole[2..]].concat();
+        let with_thumbnail = [&whole[..2], &thumbnail].concat();
+        for bytes in [whole, with_thumbnail] {
+            fs::write(&path, &bytes)?;
+            assert_eq!(Photo::open(&path)?.width(), 160);
+            fs::write(&path, &bytes[..bytes.len() * 2 / 3])?;
+            assert!(matches!(Photo::open(&path), Err(PhotoError::CutShort { .. })));
+        }
+        Ok(())
+    }
 }

@@ -21,7 +21,7 @@ const LEVEL_PITCH: f64 = 8.0;
 /// Ratio of one scale to the next: the band-pass accepts a lattice within 25 % of its own.
 const LEVEL_RATIO: f64 = 1.26;
 /// Smallest and largest pitch that are tried, in pixels of the photograph.
-const PITCHES: (f64, f64) = (7.0, 320.0);
+const PITCHES: (f64, f64) = (7.0, 700.0);
 /// Pixels looked at per scale; a larger photograph is sampled by tiles.
 const LEVEL_AREA: f64 = 4.0e5;
 /// Edge of a tile in pixels of the level.
@@ -32,6 +32,9 @@ const TILE: f64 = 200.0;
 /// pitch shows nothing regular at such scales; at much coarser ones whole pieces of comb may stand in a hexagon.
 const COARSER: RangeInclusive<f64> = 1.5..=2.2;
 const SUPERLATTICE: f64 = 0.5;
+/// A scale at which fewer cells than this sit in a hexagon of neighbours is only taken if no scale has more: any seven dark
+/// things may happen to stand like that, and at a coarse scale they cover much of the photograph.
+const FEW: usize = 3;
 
 /// Whether cells are darker or brighter than their walls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +65,8 @@ pub(crate) struct PitchEstimate {
     pub(crate) polarity: Polarity,
     /// Share of the photograph that looks like comb at this scale, 0..=1.
     pub(crate) coverage: f64,
+    /// Whether more than a few cells look so.
+    several: bool,
 }
 
 /// Finds the pitch at which the photograph looks most like comb; `None` where nothing can be tried.
@@ -71,11 +76,13 @@ pub(crate) fn find(pyramid: &Pyramid<'_>, hint: Option<f64>) -> Option<PitchEsti
     let tried: Vec<PitchEstimate> =
         levels.into_par_iter().flat_map_iter(|pitch| at_level(pyramid, pitch)).collect();
     let greatest = |among: &mut dyn Iterator<Item = &PitchEstimate>| {
-        among.copied().max_by(|a, b| a.coverage.total_cmp(&b.coverage))
+        among.copied().max_by(|a, b| a.several.cmp(&b.several).then(a.coverage.total_cmp(&b.coverage)))
     };
     let best = greatest(&mut tried.iter())?;
     let coarser = greatest(&mut tried.iter().filter(|t| COARSER.contains(&(t.pitch / best.pitch))));
-    Some(coarser.filter(|c| c.coverage > SUPERLATTICE * best.coverage).unwrap_or(best))
+    let preferred =
+        |c: &PitchEstimate| c.several >= best.several && c.coverage > SUPERLATTICE * best.coverage;
+    Some(coarser.filter(preferred).unwrap_or(best))
 }
 
 fn levels(part: Part, hint: Option<f64>) -> Vec<f64> {
@@ -106,7 +113,8 @@ fn at_level(pyramid: &Pyramid<'_>, pitch: f64) -> [PitchEstimate; 2] {
         distances.sort_by(f64::total_cmp);
         let covered: f64 = distances.iter().map(|d| d * d * 0.75_f64.sqrt()).sum();
         let median = distances.get(distances.len() / 2).copied().unwrap_or(LEVEL_PITCH);
-        PitchEstimate { pitch: median / scale, polarity, coverage: covered / area.max(1.0) }
+        let several = distances.len() >= FEW;
+        PitchEstimate { pitch: median / scale, polarity, coverage: covered / area.max(1.0), several }
     };
     let [dark, bright] = found;
     [estimate(Polarity::DarkCells, dark), estimate(Polarity::BrightCells, bright)]

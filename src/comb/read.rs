@@ -25,6 +25,8 @@ const WORK_PITCH: f64 = 36.0;
 const LEAST_WORK_PITCH: f64 = 24.0;
 /// Below this many pixels per cell the photograph is refused: walls are no longer resolved.
 pub const LEAST_PITCH: f64 = 11.0;
+/// Above this many a pitch is not looked for.
+pub const GREATEST_PITCH: f64 = 640.0;
 /// Share of the photograph that must look like comb.
 pub(crate) const LEAST_COVERAGE: f64 = 0.012;
 /// Pixels of the working raster, along each axis, per pixel of the first flood.

@@ -21,6 +21,14 @@
 //! large as the number of cells allows. The test is exact if units are exchangeable; `tests/compare.rs` measures its level on
 //! independent cells and on patterns with pairs and chains.
 //!
+//! **Which curvature.** Charge is set against plain ∫K dA. Where the cells' density ρ varies, an ordered arrangement follows
+//! K − ½∇² ln ρ instead (A. Mughal and D. Weaire, Phys. Rev. E 80, 2009, for conformal crystals), and a foam of film height h balances
+//! pressures on K − ∇² ln h (`foam::audit`). Neither is subtracted: ρ would have to be measured from the areas of cells, but a seven
+//! is larger than a five, so that the charge would be set against itself; and cells of equal volume, foam's, crowd where the gap is
+//! wide while bees' keep their width, which is one of the differences that are looked for. Between parallel walls h is constant and
+//! both terms vanish; over a closed surface they integrate to zero, so that the total charge is 6χ in any gap. Between level sets
+//! the slope of a foam is therefore not 1, and only foam and comb in the same gap may be compared by it.
+//!
 //! Not promised: with patches, a difference between one comb and one foam is found, not between bees and foams at large; what
 //! several combs or foams differ by among themselves counts only when whole patterns are shuffled. Comb and foam of different
 //! cell size on one curved surface differ in their mean number of sides by 6χ/N, whoever builds.

@@ -92,18 +92,27 @@ impl Layer {
         self.triangles.extend(mesh.triangles.iter().map(corners));
     }
 
-    fn data(&self) -> Value {
-        let triangles: Vec<u8> = self.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
+    /// The layer as the page's script reads it: points as fractions of the box from `low` to `high`, in 16 bits each, which is
+    /// a few thousandths of a millimetre; corners of triangles in 16 bits where that is enough.
+    fn data(&self, [low, high]: [DVec3; 2]) -> Value {
+        let corners = || self.triangles.iter().flatten();
+        let narrow: Option<Vec<u16>> = corners().map(|i| u16::try_from(*i).ok()).collect();
+        let triangles: Vec<u8> = match &narrow {
+            Some(narrow) => narrow.iter().flat_map(|i| i.to_le_bytes()).collect(),
+            None => corners().flat_map(|i| i.to_le_bytes()).collect(),
+        };
+        let points = |points: &mut dyn Iterator<Item = DVec3>| encoded(&fractions(points, low, high));
         let mut data = json!({
             "name": self.name,
             "colour": self.colour.hex(),
             "opacity": self.opacity,
             "shown": self.shown,
-            "positions": encoded(&floats(self.positions.iter().copied())),
+            "positions": points(&mut self.positions.iter().copied()),
             "triangles": encoded(&triangles),
+            "bits": if narrow.is_some() { 16 } else { 32 },
         });
         if !self.lines.is_empty() {
-            data["lines"] = json!(encoded(&floats(self.lines.iter().flatten().copied())));
+            data["lines"] = json!(points(&mut self.lines.iter().flatten().copied()));
         }
         if !self.pairs.is_empty() {
             let ends: Vec<[f32; 3]> = self.pairs.iter().flatten().map(|p| p.as_vec3().to_array()).collect();
@@ -135,7 +144,7 @@ impl Scene {
         json!({
             "low": low.to_array(),
             "high": high.to_array(),
-            "layers": self.layers.iter().map(Layer::data).collect::<Vec<_>>(),
+            "layers": self.layers.iter().map(|layer| layer.data([low, high])).collect::<Vec<_>>(),
         })
     }
 
@@ -254,8 +263,15 @@ fn pair_lines(pattern: &CellPattern) -> Vec<[DVec3; 2]> {
         .collect()
 }
 
-fn floats(points: impl Iterator<Item = DVec3>) -> Vec<u8> {
-    points.flat_map(|p| p.as_vec3().to_array()).flat_map(f32::to_le_bytes).collect()
+/// Points as fractions of a box, three little-endian numbers of 16 bits each.
+fn fractions(points: impl Iterator<Item = DVec3>, low: DVec3, high: DVec3) -> Vec<u8> {
+    let size = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before the cast")]
+    let fraction = |share: f64| (share.clamp(0.0, 1.0) * f64::from(u16::MAX)).round() as u16;
+    points
+        .flat_map(|p| ((p - low) / size).to_array())
+        .flat_map(|share| fraction(share).to_le_bytes())
+        .collect()
 }
 
 /// Base 64.

@@ -1,5 +1,6 @@
 "use strict";
-// The page's scenes. Data lies in the page as JSON; large arrays in it are base 64 of little-endian numbers.
+// The page's scenes. Data lies in the page as JSON; large arrays in it are base 64 of little-endian numbers. Points are
+// fractions of their scene's box, in 16 bits.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
@@ -53,10 +54,16 @@
     entry(swatch, `${FIGURES[key].title}: ${text(low)} to ${text(high)}`);
   }
 
-  function geometry(mesh) {
+  function points(text, { low, high }) {
+    const fractions = new Uint16Array(bytes(text));
+    return Float32Array.from(fractions, (f, i) => low[i % 3] + (f / 65535) * (high[i % 3] - low[i % 3]));
+  }
+
+  function geometry(mesh, box) {
     const shape = new THREE.BufferGeometry();
-    shape.setAttribute("position", new THREE.BufferAttribute(new Float32Array(bytes(mesh.positions)), 3));
-    shape.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes(mesh.triangles)), 1));
+    const corners = mesh.bits === 16 ? Uint16Array : Uint32Array;
+    shape.setAttribute("position", new THREE.BufferAttribute(points(mesh.positions, box), 3));
+    shape.setIndex(new THREE.BufferAttribute(new corners(bytes(mesh.triangles)), 1));
     shape.computeVertexNormals();
     return shape;
   }
@@ -89,7 +96,7 @@
     }
 
     addLayer(layer) {
-      const shape = geometry(layer);
+      const shape = geometry(layer, this.data);
       const cells = layer.cell_of_vertex ? new Uint16Array(bytes(layer.cell_of_vertex)) : null;
       const material = new THREE.MeshStandardMaterial({
         color: cells ? 0xffffff : layer.colour, roughness: 0.8, metalness: 0, side: THREE.DoubleSide,
@@ -106,7 +113,7 @@
       }
       if (layer.lines) {
         const lines = new THREE.BufferGeometry();
-        lines.setAttribute("position", new THREE.BufferAttribute(new Float32Array(bytes(layer.lines)), 3));
+        lines.setAttribute("position", new THREE.BufferAttribute(points(layer.lines, this.data), 3));
         const drawn = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: 0x222222 }));
         mesh.add(drawn);
       }
