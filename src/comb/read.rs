@@ -185,13 +185,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
 }
 
 /// Moves the cells that were found to the middle of what a first flood gives them. Half the resolution is enough for that.
-fn centre(
-    centres: &mut [DVec2],
-    survey: &Survey,
-    relief: &Plane,
-    pitches: &[f64],
-    hidden: Option<&[bool]>,
-) {
+fn centre(centres: &mut [DVec2], survey: &Survey, relief: &Plane, pitches: &[f64], hidden: Option<&[bool]>) {
     let (width, fill) = (relief.width(), |y: usize, row: &mut [f32]| row.copy_from_slice(relief.row(y)));
     let coarse = smooth::reduced(width, relief.height(), COARSE, fill);
     let hidden: Option<Vec<bool>> = hidden.map(|hidden| {

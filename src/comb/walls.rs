@@ -167,9 +167,11 @@ pub(crate) fn walls(
                 None => whole.push(*part),
             }
         }
-        all.extend(whole.iter().map(|g| {
-            ((cell, g.other), Wall { length: g.high - g.low, height: g.height / g.count })
-        }));
+        all.extend(
+            whole
+                .iter()
+                .map(|g| ((cell, g.other), Wall { length: g.high - g.low, height: g.height / g.count })),
+        );
     }
     all.into_iter().collect()
 }
