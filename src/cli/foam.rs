@@ -97,7 +97,7 @@ pub(super) struct SpaceArguments {
     pub(super) height: Option<f64>,
 }
 
-/// Seeds of a one-layer foam between two walls, and the partition of the gap into their cells.
+/// The ideal foam between two walls: seeds, the partition of the gap into cells, and films relaxed to least area.
 ///
 /// Without options: one period of Schwarz' P surface between the walls Φ = ±0.2, 64 cells, seed 1. Lengths are in units of
 /// the surface (of the period L where there is one).
