@@ -156,7 +156,8 @@ fn one(settings: &FoamSettings, gap: &Gap, best: &Mutex<Option<Best>>) -> Row {
     let converged = matches!(figures.ended, Stop::Converged { .. });
     let row = Row {
         seed,
-        energy: Some(figures.energy),
+        // A foam in a part of the gap is another one.
+        energy: (made.relaxed.state.part >= 1.0).then_some(figures.energy),
         converged,
         sides: foam_run::by_sides(&figures.side_counts),
         t1_count: Some(figures.t1_count),

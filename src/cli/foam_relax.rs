@@ -369,22 +369,27 @@ pub(super) fn write_all(
     foam_run::write_run(folder, settings, seconds, &in_words(made.figures.ended))
 }
 
+/// Removes a checkpoint of a run that has come to its end.
+fn remove(checkpoint: &Path) -> Result<(), CliError> {
+    match fs::remove_file(checkpoint) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(CliError::failure(error)),
+        _ => Ok(()),
+    }
+}
+
 /// Moves the files into place, prints the table, and tells a foam that is not converged from one that is.
 fn end(folder: OutputFolder, job: &Job, made: &Made) -> Result<(), CliError> {
     let checkpoint = folder.target().join(CHECKPOINT);
     match made.figures.ended {
         Stop::Converged { .. } => {
             foam_run::finished(folder, table(&made.figures))?;
-            // What it could go on from is done.
-            match fs::remove_file(&checkpoint) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => Err(CliError::failure(error)),
-                _ => Ok(()),
-            }
+            remove(&checkpoint)
         }
         stop @ Stop::TooWide { .. } => {
             let space = &made.figures.space;
             let said = format!("{}. The folder holds the foam of {space}", in_words(stop));
             foam_run::finished(folder, table(&made.figures))?;
+            remove(&checkpoint)?;
             Err(CliError::failure(anyhow!("{said}. Ask for a narrower gap, or for it as it is there")))
         }
         stop => {

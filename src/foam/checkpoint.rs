@@ -131,6 +131,12 @@ impl Checkpoint {
                 return Err(CheckpointError::Damaged(format!("{found} {what} where {expected} belong")));
             }
         }
+        let part = self.state.part;
+        if !(part > 0.0 && part <= 1.0) {
+            return Err(CheckpointError::Damaged(format!(
+                "the part {part} of the gap is not between 0 and 1"
+            )));
+        }
         let finite = places.iter().all(|place| place.is_finite()) && pressures.iter().all(|p| p.is_finite());
         if finite { Ok(()) } else { Err(CheckpointError::Damaged("a number in it is not finite".to_owned())) }
     }

@@ -63,6 +63,12 @@ impl LevelSet for SignedDistance {
         self.base.normal(self.foot(p))
     }
 
+    // One search for the foot instead of two.
+    fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let foot = self.foot(p);
+        (self.signed(p, foot), self.base.normal(foot))
+    }
+
     fn hessian(&self, p: DVec3) -> DMat3 {
         self.jet(p).hessian
     }

@@ -54,8 +54,12 @@ const MOST_FLIPS: usize = 3;
 /// The farthest that shaking moves a centre, in cell widths. Beyond a half it is a new foam, below a tenth the same one.
 const SHAKES: std::ops::Range<f64> = 0.1..0.5;
 
-/// Energies of coarse meshes that differ by less than this part are of the same foam.
-const SAME: f64 = 1e-8;
+/// Energies of coarse meshes that differ by less than this part are of the same foam: where their nodes lie along the films
+/// is not the same.
+const SAME: f64 = 1e-6;
+
+/// Energies at the end that differ by less than this part are of the same foam.
+const SAME_AT_END: f64 = 1e-9;
 
 /// Newton steps of one disturbance; what has not settled by then is given up.
 const CYCLE_STEPS: usize = 60;
@@ -100,8 +104,10 @@ pub fn anneal(
         (best.steps, best.flips) = (0, annealed.relaxed.state.flips);
         let end = resume(best, gap, relax, &mut |_| ControlFlow::Continue(()))?;
         let after = energy_of(&end.state, gap);
-        if matches!(end.stop, Stop::Converged { .. }) && after < before {
+        if matches!(end.stop, Stop::Converged { .. }) && after < before * (1.0 - SAME_AT_END) {
             (annealed.relaxed, annealed.after) = (end, after);
+        } else {
+            annealed.kept = 0;
         }
     }
     Ok(annealed)
