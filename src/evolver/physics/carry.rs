@@ -2,14 +2,14 @@
 
 use super::{
     Places,
-    freedom::State,
-    gradient::Gradients,
-    problem::{FunctionalId, Problem},
+    closed::closed_volumes,
+    freedom::{Hold, State},
+    problem::{FunctionalId, Measured, Problem},
 };
 use crate::{
     evolver::{
         error::EvolverError,
-        surface::{ConstraintId, VertexId},
+        surface::{ConstraintId, Surface, VertexId},
     },
     index::{Id, IndexVec},
 };
@@ -18,48 +18,87 @@ use glam::{DMat3, DVec3};
 /// The part of a translation that walls must leave over for it to count as a direction along them.
 const ALONG: f64 = 0.25;
 
-/// A direction along the walls, and by how much the energy changes along it.
-#[derive(Clone, Debug)]
-pub(crate) struct Carrier {
-    /// The velocity of each vertex; its root mean square is 1.
-    pub(crate) velocity: IndexVec<VertexId, DVec3>,
-    /// The change of the Lagrangian for a unit of way, at most zero.
-    pub(crate) slope: f64,
-}
+/// The velocity of each vertex.
+pub(crate) type Velocity = IndexVec<VertexId, DVec3>;
 
 impl Problem {
-    /// The translation along the walls that lowers the Lagrangian most. `None` where something holds the surface: a fixed
-    /// vertex, a boundary, walls on all sides, or no wall at all, which leaves nothing to gain.
+    /// What the energy would be more if the bodies closed on their walls had the volumes that their integrals give, to first
+    /// order. Integrals along chords of a contact line depend on where their gauge vanishes, and would draw the surface away
+    /// from there.
+    pub(crate) fn discrepancy(
+        &self,
+        surface: &Surface,
+        places: &Places,
+        multipliers: &IndexVec<FunctionalId, f64>,
+    ) -> f64 {
+        let values = self.values(places);
+        let closed = closed_volumes(self, surface, places);
+        self.functionals
+            .enumerated()
+            .filter(|(_, functional)| functional.target.is_some())
+            .map(|(id, functional)| {
+                let Measured::Volume(body) = functional.measured else { return 0.0 };
+                closed[body].map_or(0.0, |closed| multipliers[id] * (values.functionals[id] - closed))
+            })
+            .sum()
+    }
+
+    /// Translations along the walls, of root mean square 1 and orthogonal to each other. None where something holds the
+    /// surface (a fixed vertex, a boundary, walls on all sides), and none without walls, where nothing is to gain.
     ///
     /// # Errors
     /// [`EvolverError::Numerical`] if a vertex lies where its wall has no normal.
-    pub(crate) fn carrier(
-        &self,
-        state: &State,
-        multipliers: &IndexVec<FunctionalId, f64>,
-    ) -> Result<Option<Carrier>, EvolverError> {
+    pub(crate) fn carriers(&self, state: &State) -> Result<Vec<Velocity>, EvolverError> {
         let walls = self.touched_walls();
-        if walls.is_empty() || self.holds_something() {
-            return Ok(None);
+        let held = self.holds.iter().any(|hold| matches!(hold, Hold::Fixed(_) | Hold::Boundary(_)));
+        if walls.is_empty() || held {
+            return Ok(Vec::new());
         }
         let tangents = self.tangents(state, &walls);
         if !tangents.iter().all(|tangent| tangent.is_finite()) {
             let message = "a vertex lies where its wall has no normal; the surface cannot be slid".to_owned();
             return Err(EvolverError::Numerical(message));
         }
-        let gradients = self.gradients(&state.places, self.slots());
-        let forces = self.lagrangian_gradient(&gradients, multipliers);
-        // For the translation t the velocities are Tᵢ t with projections Tᵢ: slope Σ Tᵢ gᵢ, mean square t·(Σ Tᵢ / n) t.
-        let (mut slope, mut mean) = (DVec3::ZERO, DMat3::ZERO);
-        for (tangent, force) in tangents.iter().zip(forces.iter()) {
-            slope += *tangent * *force;
+        // The translation t gives velocities Tᵢ t with projections Tᵢ, of mean square t·(Σ Tᵢ / n) t.
+        let mut mean = DMat3::ZERO;
+        for tangent in &tangents {
             mean += *tangent;
         }
         #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
         let mean = mean * (1.0 / tangents.len() as f64);
-        let Some(translation) = steepest(mean, slope) else { return Ok(None) };
-        let velocity = tangents.iter().map(|tangent| *tangent * translation).collect();
-        Ok(Some(Carrier { velocity, slope: slope.dot(translation) }))
+        let field = |translation: DVec3| tangents.iter().map(|tangent| *tangent * translation).collect();
+        Ok(translations(mean).into_iter().map(field).collect())
+    }
+
+    /// The change of the Lagrangian, with the [discrepancy](Self::discrepancy), along a velocity; `step` is that of the
+    /// discrepancy's differences.
+    pub(crate) fn slope(
+        &self,
+        surface: &Surface,
+        state: &State,
+        multipliers: &IndexVec<FunctionalId, f64>,
+        velocity: &Velocity,
+        step: f64,
+    ) -> f64 {
+        let gradients = self.gradients(&state.places, self.slots());
+        let work: f64 = self
+            .holds
+            .ids()
+            .map(|vertex| {
+                let held: DVec3 =
+                    gradients.functionals.at(vertex).map(|(id, gradient)| multipliers[id] * gradient).sum();
+                (gradients.energy[vertex] - held).dot(velocity[vertex])
+            })
+            .sum();
+        let moved = |way: f64| {
+            let mut moved = state.clone();
+            for (vertex, &velocity) in velocity.enumerated() {
+                self.push(&mut moved, vertex, velocity, way);
+                self.settle(&mut moved, vertex, false);
+            }
+            self.discrepancy(surface, &moved.places, multipliers)
+        };
+        work + (moved(step) - moved(-step)) / (2.0 * step)
     }
 
     /// The constraints that vertices lie on.
@@ -69,11 +108,6 @@ impl Problem {
         walls.sort_unstable_by_key(|id| id.index());
         walls.dedup();
         walls
-    }
-
-    fn holds_something(&self) -> bool {
-        use super::freedom::Hold;
-        self.holds.iter().any(|hold| matches!(hold, Hold::Fixed(_) | Hold::Boundary(_)))
     }
 
     /// The projections onto the directions along the walls: those of a vertex's own, elsewhere along all that are touched,
@@ -99,38 +133,17 @@ impl Problem {
             })
             .collect()
     }
-
-    /// The gradient of the Lagrangian with these multipliers; the energy's has couplings in it.
-    fn lagrangian_gradient(
-        &self,
-        gradients: &Gradients,
-        multipliers: &IndexVec<FunctionalId, f64>,
-    ) -> Places {
-        self.holds
-            .ids()
-            .map(|vertex| {
-                let held: DVec3 =
-                    gradients.functionals.at(vertex).map(|(id, gradient)| multipliers[id] * gradient).sum();
-                gradients.energy[vertex] - held
-            })
-            .collect()
-    }
 }
 
-/// The translation `t` with `t·Mt = 1` of the steepest descent, among the directions that the walls leave over.
-fn steepest(mean: DMat3, slope: DVec3) -> Option<DVec3> {
+/// The translations that the walls leave over, each `t` with `t·Mt = 1`.
+fn translations(mean: DMat3) -> Vec<DVec3> {
     let matrix = faer::Mat::from_fn(3, 3, |i, j| mean.col(j)[i]);
-    let eigen = matrix.self_adjoint_eigen(faer::Side::Lower).ok()?;
+    let Ok(eigen) = matrix.self_adjoint_eigen(faer::Side::Lower) else { return Vec::new() };
     let (vectors, values) = (eigen.U(), eigen.S().column_vector());
-    let mut translation = DVec3::ZERO;
-    for k in 0..3 {
-        if values[k] > ALONG {
-            let direction = DVec3::new(vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]);
-            translation -= slope.dot(direction) / values[k] * direction;
-        }
-    }
-    let size = translation.dot(mean * translation).sqrt();
-    (size > 0.0).then(|| translation / size)
+    (0..3)
+        .filter(|&k| values[k] > ALONG)
+        .map(|k| DVec3::new(vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]) / values[k].sqrt())
+        .collect()
 }
 
 #[cfg(test)]
@@ -138,11 +151,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_steepest_translation_leaves_out_what_walls_forbid() {
-        // Walls across z; the slope is steepest there, and down along −x.
-        let mean = DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.01));
-        let found = steepest(mean, DVec3::new(2.0, 0.0, 9.0)).unwrap();
-        assert!((found - DVec3::NEG_X).length() < 1e-14, "{found}");
-        assert!(steepest(DMat3::ZERO, DVec3::X).is_none());
+    fn translations_leave_out_what_walls_forbid() {
+        // Walls across z.
+        let found = translations(DMat3::from_diagonal(DVec3::new(1.0, 0.25 + 0.75, 0.01)));
+        assert_eq!(found.len(), 2);
+        assert!(found.iter().all(|t| t.z.abs() < 1e-14 && (t.length() - 1.0).abs() < 1e-14), "{found:?}");
+        assert!(translations(DMat3::ZERO).is_empty());
     }
 }
