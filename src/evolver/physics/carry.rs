@@ -9,9 +9,10 @@ use super::{
 use crate::{
     evolver::{
         error::EvolverError,
-        surface::{ConstraintId, Surface, VertexId},
+        surface::{Surface, VertexId},
     },
-    index::{Id, IndexVec},
+    foam::energy::cross_matrix,
+    index::IndexVec,
 };
 use glam::{DMat3, DVec3};
 
@@ -43,31 +44,36 @@ impl Problem {
             .sum()
     }
 
-    /// Translations along the walls, of root mean square 1 and orthogonal to each other. None where something holds the
+    /// Motions along the walls as nearly rigid as they allow, of root mean square 1. None where something holds the
     /// surface (a fixed vertex, a boundary, walls on all sides), and none without walls, where nothing is to gain.
     ///
     /// # Errors
     /// [`EvolverError::Numerical`] if a vertex lies where its wall has no normal.
     pub(crate) fn carriers(&self, state: &State) -> Result<Vec<Velocity>, EvolverError> {
-        let walls = self.touched_walls();
+        let walls = self.holds.iter().any(|hold| !hold.constraints().is_empty());
         let held = self.holds.iter().any(|hold| matches!(hold, Hold::Fixed(_) | Hold::Boundary(_)));
-        if walls.is_empty() || held {
+        if !walls || held {
             return Ok(Vec::new());
         }
-        let tangents = self.tangents(state, &walls);
-        if !tangents.iter().all(|tangent| tangent.is_finite()) {
+        let turns = self.rigid(state);
+        if !turns.iter().all(|turn| turn.is_finite()) {
             let message = "a vertex lies where its wall has no normal; the surface cannot be slid".to_owned();
             return Err(EvolverError::Numerical(message));
         }
-        // The translation t gives velocities Tᵢ t with projections Tᵢ, of mean square t·(Σ Tᵢ / n) t.
-        let mut mean = DMat3::ZERO;
-        for tangent in &tangents {
-            mean += *tangent;
-        }
-        #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
-        let mean = mean * (1.0 / tangents.len() as f64);
-        let field = |translation: DVec3| tangents.iter().map(|tangent| *tangent * translation).collect();
-        Ok(translations(mean).into_iter().map(field).collect())
+        let mean = |walls: bool| {
+            let chosen = |vertex: &VertexId| !walls || !self.holds[*vertex].constraints().is_empty();
+            let squares =
+                turns.enumerated().filter(|(vertex, _)| chosen(vertex)).map(|(_, v)| v.transpose() * *v);
+            let (sum, count) =
+                squares.fold((DMat3::ZERO, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+            sum * (1.0 / count)
+        };
+        let (on_walls, everywhere) = (mean(true), mean(false));
+        let field = |translation: DVec3| {
+            let size = translation.dot(everywhere * translation).sqrt();
+            turns.iter().map(|turn| *turn * translation / size).collect()
+        };
+        Ok(left_over(on_walls).into_iter().map(field).collect())
     }
 
     /// The change of the Lagrangian, with the [discrepancy](Self::discrepancy), along a velocity; `step` is that of the
@@ -101,48 +107,51 @@ impl Problem {
         work + (moved(step) - moved(-step)) / (2.0 * step)
     }
 
-    /// The constraints that vertices lie on.
-    fn touched_walls(&self) -> Vec<ConstraintId> {
-        let mut walls: Vec<ConstraintId> =
-            self.holds.iter().flat_map(|hold| hold.constraints().iter().copied()).collect();
-        walls.sort_unstable_by_key(|id| id.index());
-        walls.dedup();
-        walls
-    }
-
-    /// The projections onto the directions along the walls: those of a vertex's own, elsewhere along all that are touched,
-    /// by the mean of their normals.
-    fn tangents(&self, state: &State, walls: &[ConstraintId]) -> IndexVec<VertexId, DMat3> {
-        let along_all = |place: DVec3| {
-            let mut sum = DVec3::ZERO;
-            for &wall in walls {
-                let normal = self.walls[wall].formula.jet(place).gradient.normalize();
-                sum += if sum.dot(normal) < 0.0 { -normal } else { normal };
-            }
-            let normal = sum.normalize();
-            DMat3::IDENTITY - DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z)
-        };
-        self.holds
-            .enumerated()
-            .map(|(vertex, hold)| {
-                if hold.constraints().is_empty() {
-                    return along_all(state.places[vertex]);
-                }
+    /// The velocity of each vertex for a unit translation of the whole: the translation with that turn about the middle which
+    /// leaves the least motion against the walls, less what motion is left.
+    fn rigid(&self, state: &State) -> IndexVec<VertexId, DMat3> {
+        #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
+        let count = state.places.len().max(1) as f64;
+        let middle = state.places.iter().sum::<DVec3>() / count;
+        let along: IndexVec<VertexId, DMat3> = self
+            .holds
+            .ids()
+            .map(|vertex| {
                 let axes = DVec3::AXES.map(|axis| self.projected(state, vertex, axis));
                 DMat3::from_cols(axes[0], axes[1], axes[2])
+            })
+            .collect();
+        // t − Rω with R the matrix of the arm has the part N(t − Rω) against the walls: (Σ RᵀNR) ω = Σ RᵀN t.
+        let (mut matrix, mut sides) = (DMat3::ZERO, DMat3::ZERO);
+        for (vertex, along) in along.enumerated() {
+            let arm = cross_matrix(state.places[vertex] - middle);
+            let against = arm.transpose() * (DMat3::IDENTITY - *along);
+            matrix += against * arm;
+            sides += against;
+        }
+        let size = matrix.col(0).x + matrix.col(1).y + matrix.col(2).z;
+        let turn = (matrix + DMat3::from_diagonal(DVec3::splat(UNTURNED * size))).inverse() * sides;
+        let turn = if turn.is_finite() { turn } else { DMat3::ZERO };
+        along
+            .enumerated()
+            .map(|(vertex, along)| {
+                *along * (DMat3::IDENTITY - cross_matrix(state.places[vertex] - middle) * turn)
             })
             .collect()
     }
 }
 
-/// The translations that the walls leave over, each `t` with `t·Mt = 1`.
-fn translations(mean: DMat3) -> Vec<DVec3> {
+/// Turns that cost less than this part of the others, as about the normal of round walls, are left out.
+const UNTURNED: f64 = 1e-6;
+
+/// The directions of translation that walls leave over, by the mean squares of the velocities on them.
+fn left_over(mean: DMat3) -> Vec<DVec3> {
     let matrix = faer::Mat::from_fn(3, 3, |i, j| mean.col(j)[i]);
     let Ok(eigen) = matrix.self_adjoint_eigen(faer::Side::Lower) else { return Vec::new() };
     let (vectors, values) = (eigen.U(), eigen.S().column_vector());
     (0..3)
         .filter(|&k| values[k] > ALONG)
-        .map(|k| DVec3::new(vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]) / values[k].sqrt())
+        .map(|k| DVec3::new(vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]))
         .collect()
 }
 
@@ -151,11 +160,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn translations_leave_out_what_walls_forbid() {
+    fn directions_that_walls_forbid_are_left_out() {
         // Walls across z.
-        let found = translations(DMat3::from_diagonal(DVec3::new(1.0, 0.25 + 0.75, 0.01)));
+        let found = left_over(DMat3::from_diagonal(DVec3::new(1.0, 0.9, 0.01)));
         assert_eq!(found.len(), 2);
         assert!(found.iter().all(|t| t.z.abs() < 1e-14 && (t.length() - 1.0).abs() < 1e-14), "{found:?}");
-        assert!(translations(DMat3::ZERO).is_empty());
+        assert!(left_over(DMat3::ZERO).is_empty());
     }
 }
