@@ -16,7 +16,7 @@ use crate::{
 use glam::DVec3;
 
 /// Stretches of way before giving up.
-const STRETCHES: f64 = 200.0;
+const STRETCHES: f64 = 100.0;
 /// The first stretch and the least, as parts of the size of the surface.
 const FIRST: f64 = 0.25;
 const LEAST: f64 = 1e-3;
@@ -45,13 +45,13 @@ impl Session {
             let (moved, after) = problem.stepped(&old, &direction, stretch)?;
             let sound = after.energy.is_finite() && problem.turned_over(&old.places, &moved.places) == 0;
             let mut rested = None;
-            if sound {
-                self.accept(moved, after, multipliers.clone())?;
+            if sound && self.accept(moved, after, multipliers.clone()).is_ok() {
                 rested = self.energy_at_rest().ok().filter(|energy| *energy < best);
             }
             if let Some(energy) = rested {
                 best = energy;
                 way += stretch;
+                stretch = (1.5 * stretch).min(FIRST * self.size());
             } else {
                 self.accept(old, before, multipliers)?;
                 stretch *= 0.5;
@@ -99,10 +99,18 @@ impl Session {
             let (newton, values, old) = self.newton(&still)?;
             let Some(current) = &self.problem else { break };
             let step = newton.step(&current.problem, &values)?;
-            let (moved, after) = current.problem.stepped(&old, &step.velocity, 1.0)?;
-            if !after.energy.is_finite() || current.problem.turned_over(&old.places, &moved.places) > 0 {
-                return Err(EvolverError::Numerical("the films do not come to rest".to_owned()));
+            let mut sound = None;
+            for scale in [1.0, 0.25, 0.05] {
+                let (moved, after) = current.problem.stepped(&old, &step.velocity, scale)?;
+                let turned = current.problem.turned_over(&old.places, &moved.places);
+                if after.energy.is_finite() && turned == 0 {
+                    sound = Some((moved, after));
+                    break;
+                }
             }
+            let Some((moved, after)) = sound else {
+                return Err(EvolverError::Numerical("the films do not come to rest".to_owned()));
+            };
             let multipliers = super::seek::sum(&self.multipliers, &step.multipliers);
             let settled = is_settled(&values, &after);
             self.accept(moved, after, multipliers)?;
