@@ -3,13 +3,15 @@
 
 usage: comb_accuracy.py [--program target/release/combwright] [--cells 1500] [--seeds 2] [-o analysis/comb_accuracy]
 
-Writes accuracy.csv (one row per photograph), accuracy.png and accuracy.svg. One quantity is varied at a time, about
-difficulty 0.3 at 30 pixels per cell. Needs matplotlib (requirements.txt).
+Writes accuracy.csv (one row per photograph) and accuracy.png and .svg: one quantity is varied at a time, about difficulty 0.3 at
+30 pixels per cell. Writes calibration.csv and calibration.png and .svg: of all cells with a number of sides in these photographs
+(complete and uncertain ones), those of each stated confidence, and the share that is right. Needs matplotlib (requirements.txt).
 """
 
 import argparse
 import csv
 import json
+import math
 import pathlib
 import subprocess
 import tempfile
@@ -35,6 +37,38 @@ LINES = [
 ]
 
 
+# Stated confidence from .. to; the last bins are narrow since most cells are in them.
+BINS = [0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 1.0]
+
+
+def claims(cells, truth):
+    """(confidence, whether right) of every cell that has a number of sides and lies on a whole true cell. Where a wall of the truth is too
+    short to be seen, both numbers are right."""
+    rows = list(csv.DictReader(open(truth, newline="", encoding="utf-8")))
+    bins = {}
+    for row in rows:
+        if row["complete"] != "1":
+            continue
+        at = (float(row["x_px"]), float(row["y_px"]))
+        bins.setdefault((int(at[0] // 64), int(at[1] // 64)), []).append((at, (row["sides"], row["other_sides"])))
+    said = []
+    for row in csv.DictReader(open(cells, newline="", encoding="utf-8")):
+        if not row["sides"]:
+            continue
+        at = (float(row["x_px"]), float(row["y_px"]))
+        width = math.sqrt(float(row["area_px2"]))
+        near = [
+            (math.dist(at, place), sides)
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+            for place, sides in bins.get((int(at[0] // 64) + i, int(at[1] // 64) + j), [])
+        ]
+        distance, sides = min(near, default=(math.inf, ()))
+        if distance < 0.35 * width:
+            said.append((float(row["confidence"]), row["sides"] in sides))
+    return said
+
+
 def measure(program, cells, seed, options):
     """Draws, reads and scores one photograph. One that is refused scores nothing found and nothing said."""
     with tempfile.TemporaryDirectory() as home:
@@ -43,10 +77,11 @@ def measure(program, cells, seed, options):
         subprocess.run(draw, check=True, capture_output=True)
         read = subprocess.run([program, "comb", f"{home}/synth/photo.png", "-o", f"{home}/out"], capture_output=True, check=False)
         if read.returncode != 0:
-            return {"recall": 0.0, "coverage": 0.0, "sides_right": None, "sure_right": None, "refused": 1}
+            return {"recall": 0.0, "coverage": 0.0, "sides_right": None, "sure_right": None, "refused": 1}, []
         command = [program, "comb", "score", f"{home}/out/photo/cells.csv", f"{home}/synth/truth.csv", "--json"]
         result = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-        return {**{k: v for k, v in result.items() if k != "wrong"}, "refused": 0}
+        said = claims(f"{home}/out/photo/cells.csv", f"{home}/synth/truth.csv")
+        return {**{k: v for k, v in result.items() if k != "wrong"}, "refused": 0}, said
 
 
 def main():
@@ -57,11 +92,12 @@ def main():
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("-o", "--output", type=pathlib.Path, default=root / "analysis/comb_accuracy")
     arguments = parser.parse_args()
-    rows = []
+    rows, said = [], []
     for scan, (_, values) in SCANS.items():
         for value in values:
             for seed in range(1, arguments.seeds + 1):
-                result = measure(arguments.program, arguments.cells, seed, {**BASE, scan: value})
+                result, claimed = measure(arguments.program, arguments.cells, seed, {**BASE, scan: value})
+                said += claimed
                 rows.append({"scan": scan, "value": value, "seed": seed, **result})
     arguments.output.mkdir(parents=True, exist_ok=True)
     columns = list(max(rows, key=len))
@@ -70,6 +106,7 @@ def main():
         writer.writeheader()
         writer.writerows(rows)
     plot(rows, arguments)
+    calibration(said, arguments)
 
 
 def plot(rows, arguments):
@@ -87,8 +124,37 @@ def plot(rows, arguments):
         axis.set_ylim(0.5, 1.005)
     axes[0].set_ylabel("share")
     axes[0].legend(loc="lower right", fontsize=8)
+    save(figure, arguments.output, "accuracy")
+
+
+def calibration(said, arguments):
+    table = []
+    for low, high in zip(BINS, BINS[1:]):
+        right = [r for confidence, r in said if low <= confidence < high or (high == 1.0 and confidence == 1.0)]
+        if right:
+            mean = sum(c for c, _ in said if low <= c < high) / len(right)
+            table.append({"from": low, "to": high, "cells": len(right), "stated": round(mean, 4), "right": round(sum(right) / len(right), 4)})
+    with open(arguments.output / "calibration.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(table[0]))
+        writer.writeheader()
+        writer.writerows(table)
+    figure, axis = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
+    axis.plot([0.3, 1], [0.3, 1], color="#9a9a9a", linewidth=0.8)
+    share = [row["right"] for row in table]
+    spread = [1.96 * math.sqrt(max(r * (1 - r), 1e-9) / row["cells"]) for r, row in zip(share, table)]
+    stated = [row["stated"] for row in table]
+    axis.errorbar(stated, share, yerr=spread, marker="o", markersize=4, color="#0072b2", linewidth=1, capsize=2)
+    for row in table:
+        axis.annotate(f"{row['cells']}", (row["stated"], row["right"]), textcoords="offset points", xytext=(-5, 5), ha="right", fontsize=7)
+    axis.set_xlabel("stated confidence")
+    axis.set_ylabel("share of right numbers of sides")
+    axis.set_title(f"{len(said)} cells", fontsize=9)
+    save(figure, arguments.output, "calibration")
+
+
+def save(figure, folder, name):
     for kind, metadata in (("png", None), ("svg", {"Date": None})):
-        figure.savefig(arguments.output / f"accuracy.{kind}", dpi=130, metadata=metadata)
+        figure.savefig(folder / f"{name}.{kind}", dpi=130, metadata=metadata)
 
 
 if __name__ == "__main__":

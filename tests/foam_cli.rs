@@ -164,6 +164,48 @@ fn the_best_of_some_runs_is_kept_whatever_the_threads() -> Tested {
 }
 
 #[test]
+fn what_is_known_exactly_is_told_instead_of_relaxed() -> Tested {
+    for (cells, films) in [(2, 2.0), (3, 3.0)] {
+        let home = tempfile::tempdir()?;
+        let ended = foam(home.path(), &format!("--surface sphere --radii 1,1.1 -n {cells}"))?;
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(2), "{said}");
+        // Half discs between the spheres, each of area π (R₂² − R₁²)/2.
+        let energy = films * 0.5 * std::f64::consts::PI * (1.1_f64.powi(2) - 1.0);
+        assert!(said.contains(&format!("{energy:.10}")), "{said}");
+    }
+    Ok(())
+}
+
+#[test]
+fn annealing_and_extrapolation_are_reported() -> Tested {
+    let home = tempfile::tempdir()?;
+    let ended =
+        foam(home.path(), "--surface sphere --radii 1,1.1 -n 12 --sweeps 100 --anneal 4 --extrapolate")?;
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let summary = json(&home.path().join("out/summary.json"))?;
+    assert_eq!(summary["annealing"]["cycles"], 4);
+    // The dodecahedron is the least partition of twelve cells: no disturbance can lower it.
+    assert_eq!(summary["annealing"]["kept"], 0);
+    let exact = 30.0 * (5.0_f64.sqrt() / 3.0).acos() * (1.1 * 1.1 - 1.0) / 2.0;
+    let limit = summary["extrapolated"]["limit"].as_f64().ok_or("no limit")?;
+    // Richardson's step takes the fourth order away: 4e-5 with two elements along an edge becomes below 1e-6.
+    assert!((limit / exact - 1.0).abs() < 1e-6, "{limit} is not {exact}");
+    Ok(())
+}
+
+#[test]
+fn many_runs_tell_their_distribution() -> Tested {
+    let home = tempfile::tempdir()?;
+    let ended = foam(home.path(), "--surface sphere --radii 1,1.1 -n 12 --sweeps 50 --runs 3")?;
+    let said = String::from_utf8_lossy(&ended.stdout);
+    for line in ["runs", "best energy", "quartiles", "runs at the lowest", "cells by sides"] {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+    Ok(())
+}
+
+#[test]
 fn a_checkpoint_that_is_none_is_refused() -> Tested {
     let home = tempfile::tempdir()?;
     for (text, says) in [

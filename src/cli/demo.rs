@@ -215,6 +215,8 @@ impl<'a> Demo<'a> {
             relax: RelaxSettings::default(),
             last_stage: Stage::Foam,
             runs: 1,
+            anneal: 0,
+            extrapolate: false,
             jobs: None,
             write_fe: None,
             output: PathBuf::new(),

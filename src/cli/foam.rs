@@ -97,7 +97,7 @@ pub(super) struct SpaceArguments {
     pub(super) height: Option<f64>,
 }
 
-/// Seeds of a one-layer foam between two walls, and the partition of the gap into their cells.
+/// The ideal foam between two walls: seeds, the partition of the gap into cells, and films relaxed to least area.
 ///
 /// Without options: one period of Schwarz' P surface between the walls Φ = ±0.2, 64 cells, seed 1. Lengths are in units of
 /// the surface (of the period L where there is one).
@@ -112,6 +112,8 @@ pub(super) struct SpaceArguments {
   combwright foam --recipe enclosures/paper/recipe.toml --cell-width 20mm
   combwright foam --stop-after partition --density uniform
   combwright foam --cells 32 --runs 100 -j 2
+  combwright foam --cells 32 --anneal 200
+  combwright foam --surface sphere --radii 0.9995,1.0005 --cells 20 --anneal 100 --extrapolate
   combwright foam --layers 2 --surface plane --periods 8,9.2376 --height 2.3 --cells 64 --pattern toth
   combwright foam --resume out/checkpoint -o out"
 )]
@@ -155,7 +157,7 @@ pub(super) struct FoamArguments {
     pub(super) lloyd: usize,
 
     /// Layers of cells: 1, or 2 as in natural comb, with --cells on each wall
-    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), conflicts_with_all = ["resume", "runs", "stop_after"], help_heading = "Layers")]
+    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), conflicts_with_all = ["resume", "runs", "stop_after", "anneal", "extrapolate"], help_heading = "Layers")]
     pub(super) layers: u8,
     /// How the cells of two layers are arranged
     #[arg(long, value_enum, default_value = "annealed", help_heading = "Layers")]
@@ -167,6 +169,12 @@ pub(super) struct FoamArguments {
     /// The largest force at the end, in units of tension × cell width [default: 1e-11]
     #[arg(long, value_name = "FORCE", allow_negative_numbers = true, help_heading = "Relaxation")]
     pub(super) tolerance: Option<f64>,
+    /// Disturb the settled foam so many times, by random T1s and by shaking, and keep what is lower
+    #[arg(long, value_name = "CYCLES", default_value_t = 0, help_heading = "Relaxation")]
+    pub(super) anneal: usize,
+    /// Also relax on elements of half the size, and print the energy that a mesh without end would have
+    #[arg(long, help_heading = "Relaxation")]
+    pub(super) extrapolate: bool,
     /// Go on from a checkpoint that an earlier run left in its folder
     #[arg(long, value_name = "FILE", conflicts_with_all = RESUME_CONFLICTS, help_heading = "Relaxation")]
     pub(super) resume: Option<PathBuf>,

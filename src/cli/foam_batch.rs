@@ -2,8 +2,9 @@
 
 use super::{
     CliError,
-    foam_relax::{Begin, Job, Keeper, Made, in_words, write_all},
-    foam_run,
+    foam_figures::{AnnealingFigures, in_words},
+    foam_relax::{Begin, Job, Keeper, Made, annealed, write_all},
+    foam_run::{self, Line},
     foam_settings::FoamSettings,
     interrupt, progress,
 };
@@ -17,6 +18,8 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::{
+    cmp::Reverse,
+    collections::BTreeMap,
     sync::{Mutex, PoisonError},
     time::Instant,
 };
@@ -42,7 +45,11 @@ struct Best {
     job: Job,
     seeds: Seeds,
     made: Made,
+    annealing: Option<AnnealingFigures>,
 }
+
+/// What one run gave.
+type MadeRun = (Job, Seeds, Made, Option<AnnealingFigures>);
 
 /// Makes all foams, writes their distribution and all files of the best.
 pub(super) fn run(settings: &FoamSettings) -> Result<(), CliError> {
@@ -66,26 +73,73 @@ pub(super) fn run(settings: &FoamSettings) -> Result<(), CliError> {
     let best = best.into_inner().unwrap_or_else(PoisonError::into_inner);
     write_rows(&mut folder, &rows)?;
     let energies: Vec<f64> = rows.iter().filter(|row| row.converged).filter_map(|row| row.energy).collect();
-    let Some(Best { seed, job, seeds, made }) = best else {
+    let Some(Best { seed, job, seeds, made, annealing }) = best else {
         folder.commit()?;
         let first = rows.first().map_or("interrupted before the first ended", |row| &row.ended);
         return Err(CliError::failure(anyhow!("none of {} runs converged; the first: {first}", rows.len())));
     };
-    let made = made.with_lowest_eigenvalue(&gap);
+    let made = made.finished(&job, settings, &gap, annealing)?;
     let chart = foam_chart::energies(&energies).map_err(CliError::failure)?;
     folder.write_bytes("runs.svg", chart.svg().as_bytes())?;
     let seconds = vec![("all runs", began.elapsed().as_secs_f64())];
     write_all(&mut folder, &job, &settings.with_seed(seed), &gap, &made, Some(&seeds), seconds)?;
-    let mean = energies.iter().sum::<f64>() / f64::from(crate::index::checked_u32(energies.len()));
-    let lines = vec![
+    let mut lines = vec![
         ("space", job.space.to_string()),
         ("runs", format!("{} of {} converged", energies.len(), rows.len())),
         ("best energy", format!("{:.10} (seed {seed})", made.figures.energy)),
-        ("mean energy", format!("{mean:.10}")),
         ("best cells by sides", foam_run::by_sides(&made.figures.side_counts)),
-        ("time", format!("{:.1} s", began.elapsed().as_secs_f64())),
     ];
+    lines.extend(distribution(&rows));
+    lines.extend(made.figures.extra_lines());
+    lines.push(("time", format!("{:.1} s", began.elapsed().as_secs_f64())));
     foam_run::finished(folder, lines)
+}
+
+/// Energies that differ by less than this part are of the same foam: the residual's square, and the mesh's nodes.
+const SAME_ENERGY: f64 = 1e-8;
+
+/// Numbers of sides named before the rest is only counted.
+const NAMED: usize = 4;
+
+/// How energies and defects are distributed, and why runs failed.
+fn distribution(rows: &[Row]) -> Vec<Line> {
+    let mut energies: Vec<f64> =
+        rows.iter().filter(|row| row.converged).filter_map(|row| row.energy).collect();
+    energies.sort_by(f64::total_cmp);
+    let mut lines = Vec::new();
+    if let (Some(&least), Some(&most)) = (energies.first(), energies.last()) {
+        let count = energies.len();
+        let at = |share: usize| energies[(share * (count - 1) + 2) / 4];
+        let mean = energies.iter().sum::<f64>() / f64::from(crate::index::checked_u32(count));
+        let lowest = energies.iter().filter(|&&energy| energy < least * (1.0 + SAME_ENERGY)).count();
+        let quartiles = format!("{:.8}, {:.8}, {:.8}", at(1), at(2), at(3));
+        lines.push(("mean energy", format!("{mean:.10}")));
+        lines.push(("quartiles", quartiles));
+        lines.push(("highest energy", format!("{most:.10}")));
+        lines.push(("runs at the lowest", lowest.to_string()));
+    }
+    let sides = counted(rows.iter().filter(|row| row.converged).map(|row| row.sides.as_str()));
+    for (sides, count) in sides.iter().take(NAMED) {
+        lines.push(("cells by sides", format!("{sides}: {count} runs")));
+    }
+    if sides.len() > NAMED {
+        lines.push(("cells by sides", format!("{} other ways", sides.len() - NAMED)));
+    }
+    for row in rows.iter().filter(|row| !row.converged) {
+        lines.push(("failed", format!("seed {}: {}", row.seed, row.ended)));
+    }
+    lines
+}
+
+/// How often each text occurs, the commonest first.
+fn counted<'a>(texts: impl Iterator<Item = &'a str>) -> Vec<(&'a str, usize)> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for text in texts {
+        *counts.entry(text).or_default() += 1;
+    }
+    let mut counts: Vec<_> = counts.into_iter().collect();
+    counts.sort_by_key(|&(_, count)| Reverse(count));
+    counts
 }
 
 /// One run; keeps it if it is the best.
@@ -94,7 +148,7 @@ fn one(settings: &FoamSettings, gap: &Gap, best: &Mutex<Option<Best>>) -> Row {
     let seed = settings.seeds.seed;
     let made = make(settings, gap);
     let seconds = began.elapsed().as_secs_f64();
-    let (job, seeds, made) = match made {
+    let (job, seeds, made, annealing) = match made {
         Ok(made) => made,
         Err(error) => return Row::failed(seed, seconds, &error),
     };
@@ -119,13 +173,13 @@ fn one(settings: &FoamSettings, gap: &Gap, best: &Mutex<Option<Best>>) -> Row {
             new.total_cmp(&old).then(seed.cmp(&best.seed)).is_lt()
         });
         if better {
-            *best = Some(Best { seed, job, seeds, made });
+            *best = Some(Best { seed, job, seeds, made, annealing });
         }
     }
     row
 }
 
-fn make(settings: &FoamSettings, gap: &Gap) -> Result<(Job, Seeds, Made), CliError> {
+fn make(settings: &FoamSettings, gap: &Gap) -> Result<MadeRun, CliError> {
     let domain = settings.space.domain().map_err(CliError::mistake)?;
     let start =
         start(gap, &domain, &settings.seeds, &mut |_| interrupt::flow()).map_err(CliError::failure)?;
@@ -136,8 +190,9 @@ fn make(settings: &FoamSettings, gap: &Gap) -> Result<(Job, Seeds, Made), CliErr
     let hidden = ProgressBar::hidden();
     let mut keeper = Keeper::new(&job, &hidden, None, Vec::new());
     let relaxed = keeper.relax(Begin::Network(network), gap)?;
+    let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, &hidden)?;
     let made = Made::new(&job, gap, relaxed, keeper.record)?;
-    Ok((job, start.seeds, made))
+    Ok((job, start.seeds, made, annealing))
 }
 
 impl Row {

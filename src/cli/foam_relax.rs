@@ -2,20 +2,21 @@
 
 use super::{
     CliError,
-    foam_run::{self, Line},
+    foam_figures::{AnnealingFigures, Figures, table},
+    foam_run,
     foam_settings::FoamSettings,
     interrupt,
 };
 use crate::{
     evolver::write::foam_datafile,
     foam::{
-        audit::{Audit, audit},
+        audit::audit,
         checkpoint::{Checkpoint, StepRecord},
         energy::energy,
         flat_hexagonal_energy,
         network::Network,
         pattern::{PatternPlace, pattern_of_state},
-        relax::{self, Progress, RelaxSettings, Relaxed, State, Stop},
+        relax::{self, AnnealSettings, Annealed, Progress, RelaxSettings, Relaxed, State, Stop},
         seeds::{SeedSettings, Seeds},
         setup::FoamSpace,
         volume::{Reference, volumes},
@@ -31,7 +32,6 @@ use crate::{
 };
 use anyhow::anyhow;
 use indicatif::ProgressBar;
-use serde::Serialize;
 use std::{
     fs, io,
     io::Write,
@@ -39,6 +39,8 @@ use std::{
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
+
+pub(super) use super::foam_figures::in_words;
 
 /// The name of the checkpoint in the folder of results.
 const CHECKPOINT: &str = "checkpoint.json";
@@ -61,43 +63,6 @@ pub(super) struct Made {
     pub(super) figures: Figures,
     pub(super) pattern: CellPattern,
     pub(super) cells: CellFigures,
-}
-
-/// The figures of a foam: `summary.json`.
-#[derive(Clone, Debug, Serialize)]
-pub(super) struct Figures {
-    schema: &'static str,
-    pub(super) cells: usize,
-    space: String,
-    /// Films' area times their tension, 1.
-    pub(super) energy: f64,
-    /// That of the flat hexagonal foam of the same cells.
-    flat_hexagonal_energy: f64,
-    energy_over_flat: f64,
-    /// How many cells have 0, 1, 2 … sides.
-    pub(super) side_counts: Vec<usize>,
-    /// Σ (6 − n).
-    charge: i64,
-    gap_volume: f64,
-    /// The largest relative deviation of a cell's volume from its target.
-    volume_error: f64,
-    /// Pressures relative to their mean.
-    pressure_min: f64,
-    pressure_max: f64,
-    /// T1s on the way.
-    pub(super) t1_count: usize,
-    pub(super) newton_steps: usize,
-    /// The largest force left, in units of tension × cell width.
-    pub(super) residual: f64,
-    /// Directions of negative curvature: 0 at a minimum.
-    pub(super) unstable_directions: usize,
-    /// The lowest eigenvalue of the Hessian at constant volumes.
-    lowest_eigenvalue: Option<f64>,
-    /// Pressures against sides and curvature, cell by cell.
-    audit: Audit,
-    psi6_of_seeds: f64,
-    #[serde(flatten)]
-    pub(super) ended: Stop,
 }
 
 /// A checkpoint from a file, checked.
@@ -128,11 +93,12 @@ pub(super) fn run(
     let job = Job::new(settings, start.seeds.psi6);
     let mut keeper = Keeper::new(&job, bar, Some(folder.target().join(CHECKPOINT)), Vec::new());
     let relaxed = keeper.relax(Begin::Network(network), gap)?;
+    let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, bar)?;
+    let made = Made::new(&job, gap, relaxed, keeper.record)?.finished(&job, settings, gap, annealing)?;
     let seconds = vec![
         ("seeds and partition", until_partition),
         ("relaxation", began.elapsed().as_secs_f64() - until_partition),
     ];
-    let made = Made::new(&job, gap, relaxed, keeper.record)?.with_lowest_eigenvalue(gap);
     write_all(&mut folder, &job, settings, gap, &made, Some(&start.seeds), seconds)?;
     bar.finish_and_clear();
     end(folder, &job, &made)
@@ -152,8 +118,9 @@ pub(super) fn resume(checkpoint: Checkpoint, mut settings: FoamSettings) -> Resu
     let began = Instant::now();
     let mut keeper = Keeper::new(&job, &bar, Some(folder.target().join(CHECKPOINT)), record);
     let relaxed = keeper.relax(Begin::State(state), &gap)?;
+    let (relaxed, annealing) = annealed(&job, &gap, relaxed, settings.anneal, &bar)?;
+    let made = Made::new(&job, &gap, relaxed, keeper.record)?.finished(&job, &settings, &gap, annealing)?;
     let seconds = vec![("relaxation, resumed", began.elapsed().as_secs_f64())];
-    let made = Made::new(&job, &gap, relaxed, keeper.record)?.with_lowest_eigenvalue(&gap);
     write_all(&mut folder, &job, &settings, &gap, &made, None, seconds)?;
     bar.finish_and_clear();
     end(folder, &job, &made)
@@ -247,7 +214,30 @@ fn save(path: &Path, job: &Job, record: &[StepRecord], state: &State) -> Result<
     Ok(write_whole(path, write)?)
 }
 
+/// A settled foam disturbed `cycles` times; another one as it is.
+pub(super) fn annealed(
+    job: &Job,
+    gap: &Gap,
+    relaxed: Relaxed,
+    cycles: usize,
+    bar: &ProgressBar,
+) -> Result<(Relaxed, Option<AnnealingFigures>), CliError> {
+    if cycles == 0 || !matches!(relaxed.stop, Stop::Converged { .. }) {
+        return Ok((relaxed, None));
+    }
+    let domain = job.space.domain().map_err(CliError::mistake)?;
+    let settings = AnnealSettings { cycles, seed: job.seeds.seed };
+    let told = &mut |cycle| {
+        bar.set_message(format!("annealing: disturbance {} of {cycles}", cycle + 1));
+        interrupt::flow()
+    };
+    let annealed = relax::anneal(relaxed, gap, &domain, &job.relax, settings, told);
+    let Annealed { relaxed, before, settled, kept, .. } = annealed.map_err(CliError::failure)?;
+    Ok((relaxed, Some(AnnealingFigures { cycles, settled, kept, energy_before: before })))
+}
+
 impl Made {
+    /// The figures of a foam. One in a part of the gap is described in the space that it fills.
     pub(super) fn new(
         job: &Job,
         gap: &Gap,
@@ -255,6 +245,7 @@ impl Made {
         record: Vec<StepRecord>,
     ) -> Result<Self, CliError> {
         let state = &relaxed.state;
+        let (space, gap) = (job.space.narrowed(state.part), &gap.narrowed(state.part));
         let complex = state.strips.complex(&state.network, gap);
         let reference = Reference::new(&complex, &state.places);
         let volumes = volumes(&complex, &state.places, &reference).into_vec();
@@ -272,13 +263,13 @@ impl Made {
         };
         let total: f64 = cells.volumes.iter().sum();
         let energy = energy(&complex, &state.places);
-        let domain = job.space.domain().map_err(CliError::mistake)?;
+        let domain = space.domain().map_err(CliError::mistake)?;
         let flat = flat_hexagonal_energy(gap, &domain, cells.volumes.len());
         let error = |(volume, share): (&f64, &f64)| (volume / (share * total) - 1.0).abs();
         let figures = Figures {
             schema: foam_run::SUMMARY_SCHEMA,
             cells: cells.volumes.len(),
-            space: job.space.to_string(),
+            space: space.to_string(),
             energy,
             flat_hexagonal_energy: flat,
             energy_over_flat: energy / flat,
@@ -295,6 +286,8 @@ impl Made {
             lowest_eigenvalue: None,
             audit: audit(state, gap),
             psi6_of_seeds: job.psi6,
+            annealing: None,
+            extrapolated: None,
             ended: relaxed.stop,
         };
         Ok(Self { relaxed, record, figures, pattern, cells })
@@ -302,12 +295,24 @@ impl Made {
 }
 
 impl Made {
-    /// With the lowest eigenvalue of a converged foam, which takes about as long as some Newton steps.
-    pub(super) fn with_lowest_eigenvalue(mut self, gap: &Gap) -> Self {
+    /// With what takes some more time: a settled foam's lowest eigenvalue, and its energy without a mesh if asked for.
+    pub(super) fn finished(
+        mut self,
+        job: &Job,
+        settings: &FoamSettings,
+        gap: &Gap,
+        annealing: Option<AnnealingFigures>,
+    ) -> Result<Self, CliError> {
+        self.figures.annealing = annealing;
         if matches!(self.figures.ended, Stop::Converged { .. }) {
-            self.figures.lowest_eigenvalue = relax::lowest_eigenvalue(&self.relaxed.state, gap).ok();
+            let state = &self.relaxed.state;
+            self.figures.lowest_eigenvalue = relax::lowest_eigenvalue(state, gap).ok();
+            if settings.extrapolate {
+                self.figures.extrapolated = relax::extrapolate(state, gap, &job.relax, &mut interrupt::flow)
+                    .map_err(CliError::failure)?;
+            }
         }
-        self
+        Ok(self)
     }
 }
 
@@ -331,6 +336,7 @@ pub(super) fn write_all(
     seconds: Vec<(&'static str, f64)>,
 ) -> Result<(), CliError> {
     let state = &made.relaxed.state;
+    let (space, gap) = (job.space.narrowed(state.part), &gap.narrowed(state.part));
     folder.write_json("pattern.json", &made.pattern)?;
     for (name, wall) in
         [("pattern-lower-wall.json", WallSide::Lower), ("pattern-upper-wall.json", WallSide::Upper)]
@@ -342,7 +348,7 @@ pub(super) fn write_all(
     let surface = pieces(state, gap);
     folder.write("films.vtp", |writer| foam_export::write_vtp(writer, &surface, &made.cells))?;
     folder.write("films.glb", |writer| foam_export::write_glb(writer, &surface, &made.cells))?;
-    let title = format!("{}, N = {}: relaxed foam", job.space, made.figures.cells);
+    let title = format!("{space}, N = {}: relaxed foam", made.figures.cells);
     FoamScene::of_foam(&surface, &made.cells, gap, title).draw()?.write_png(folder, "foam", 1.0)?;
     if !made.record.is_empty() {
         let chart = foam_chart::relaxation(&made.record).map_err(CliError::failure)?;
@@ -355,26 +361,12 @@ pub(super) fn write_all(
     if let Some(name) = &settings.write_fe {
         let complex = state.strips.complex(&state.network, gap);
         let title =
-            format!("{}, N = {}, by combwright {}", job.space, made.figures.cells, env!("CARGO_PKG_VERSION"));
-        let text = foam_datafile(&job.space, &complex, &state.places, &title).map_err(CliError::mistake)?;
+            format!("{space}, N = {}, by combwright {}", made.figures.cells, env!("CARGO_PKG_VERSION"));
+        let text = foam_datafile(&space, &complex, &state.places, &title).map_err(CliError::mistake)?;
         folder.write_bytes(name.as_str(), text.as_bytes())?;
     }
     folder.write_json("summary.json", &made.figures)?;
     foam_run::write_run(folder, settings, seconds, &in_words(made.figures.ended))
-}
-
-/// How a relaxation ended, for people.
-pub(super) fn in_words(stop: Stop) -> String {
-    match stop {
-        Stop::Converged { steps } => format!("converged in {steps} steps"),
-        Stop::StepLimit { residual } => {
-            format!("not converged: the steps ran out at a force of {residual:.1e}")
-        }
-        Stop::Stalled { steps, residual } => {
-            format!("not converged: stalled after {steps} steps at a force of {residual:.1e}")
-        }
-        Stop::Interrupted { steps } => format!("interrupted after {steps} steps"),
-    }
 }
 
 /// Moves the files into place, prints the table, and tells a foam that is not converged from one that is.
@@ -389,6 +381,12 @@ fn end(folder: OutputFolder, job: &Job, made: &Made) -> Result<(), CliError> {
                 _ => Ok(()),
             }
         }
+        stop @ Stop::TooWide { .. } => {
+            let space = &made.figures.space;
+            let said = format!("{}. The folder holds the foam of {space}", in_words(stop));
+            foam_run::finished(folder, table(&made.figures))?;
+            Err(CliError::failure(anyhow!("{said}. Ask for a narrower gap, or for it as it is there")))
+        }
         stop => {
             save(&checkpoint, job, &made.record, &made.relaxed.state)?;
             foam_run::finished(folder, table(&made.figures))?;
@@ -396,38 +394,4 @@ fn end(folder: OutputFolder, job: &Job, made: &Made) -> Result<(), CliError> {
             Err(CliError::failure(anyhow!("the foam is {}; {resume}", in_words(stop))))
         }
     }
-}
-
-/// The audit in one line: how well pressures agree with sides and curvature.
-fn audit_in_words(audit: &Audit) -> String {
-    match audit.correlation {
-        Some(correlation) => format!(
-            "correlation {correlation:.6} (rms difference {:.1e} of {:.1e})",
-            audit.rms_difference, audit.rms_signal
-        ),
-        None => format!("all cells alike, rms difference {:.1e}", audit.rms_difference),
-    }
-}
-
-fn table(figures: &Figures) -> Vec<Line> {
-    vec![
-        ("space", figures.space.clone()),
-        ("cells", figures.cells.to_string()),
-        ("ended", in_words(figures.ended)),
-        ("energy", format!("{:.10}", figures.energy)),
-        ("over flat foam", format!("{:.6}", figures.energy_over_flat)),
-        ("cells by sides", foam_run::by_sides(&figures.side_counts)),
-        ("charge Σ(6−n)", figures.charge.to_string()),
-        ("pressures", format!("{:.4} to {:.4}, mean 0", figures.pressure_min, figures.pressure_max)),
-        ("volume of the gap", format!("{:.12}", figures.gap_volume)),
-        ("volume error", format!("{:.1e}", figures.volume_error)),
-        ("T1s", figures.t1_count.to_string()),
-        ("residual", format!("{:.1e}", figures.residual)),
-        ("unstable directions", figures.unstable_directions.to_string()),
-        (
-            "lowest eigenvalue",
-            figures.lowest_eigenvalue.map_or("-".to_owned(), |value| format!("{value:.2e}")),
-        ),
-        ("law of the thin limit", audit_in_words(&figures.audit)),
-    ]
 }

@@ -53,6 +53,10 @@ pub(super) struct FoamSettings {
     pub(super) relax: RelaxSettings,
     pub(super) last_stage: Stage,
     pub(super) runs: u64,
+    /// Disturbances after the relaxation.
+    pub(super) anneal: usize,
+    /// Whether a finer mesh is relaxed, too, for the energy without a mesh.
+    pub(super) extrapolate: bool,
     #[serde(skip)]
     pub(super) jobs: Option<usize>,
     #[serde(skip)]
@@ -98,7 +102,10 @@ impl FoamSettings {
             Err(_) => {}
         }
         let seeds = seeds(arguments, cells);
-        faults.extend(seeds.faults().iter().map(ToString::to_string));
+        match few_on_a_sphere(&space, cells) {
+            Some(exact) if arguments.stop_after.is_none() => faults.push(exact),
+            _ => faults.extend(seeds.faults().iter().map(ToString::to_string)),
+        }
         let last_stage = match arguments.stop_after {
             Some(StageName::Seeds) => Stage::Seeds,
             Some(StageName::Partition) => Stage::Partition,
@@ -115,6 +122,8 @@ impl FoamSettings {
             relax,
             last_stage,
             runs: arguments.runs,
+            anneal: arguments.anneal,
+            extrapolate: arguments.extrapolate,
             jobs: arguments.jobs,
             write_fe: arguments.write_fe.clone(),
             output: arguments.output.clone(),
@@ -165,6 +174,21 @@ fn seeds(arguments: &FoamArguments, cells: usize) -> SeedSettings {
     anneal.hot = arguments.hot.unwrap_or(anneal.hot);
     anneal.cold = arguments.cold.unwrap_or(anneal.cold);
     seeds
+}
+
+/// Foams between spheres that are known exactly and have no network of cells with three corners or more.
+fn few_on_a_sphere(space: &FoamSpace, cells: usize) -> Option<String> {
+    let FoamSpace::Sphere { radii: [inner, outer] } = *space else { return None };
+    let half_disc = 0.5 * std::f64::consts::PI * (outer * outer - inner * inner);
+    let (films, why) = match cells {
+        2 => (2.0, "one plane film that closes on itself parts the shell, without Plateau borders"),
+        3 => (3.0, "three half planes part the shell, and meet in two Plateau borders on one axis"),
+        _ => return None,
+    };
+    Some(format!(
+        "N = {cells} between spheres needs no relaxation: {why}; the energy is exactly {:.10}. Networks here have cells of three sides or more: ask for at least 4 cells",
+        films * half_disc
+    ))
 }
 
 /// One period of the gap that an enclosure's recipe describes, in mm.

@@ -30,6 +30,7 @@ mod evolver;
 mod foam;
 mod foam_batch;
 mod foam_bubble;
+mod foam_figures;
 mod foam_layers;
 mod foam_relax;
 mod foam_run;

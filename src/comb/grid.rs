@@ -1,24 +1,35 @@
 //! Points in square bins, for neighbours within a distance.
 
-use glam::DVec2;
-use std::collections::BTreeMap;
+use glam::{DVec2, I64Vec2};
+
+/// Bins that a grid is widened by on every side when a point lies outside.
+const SPARE: i64 = 4;
 
 /// Points in square bins.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     edge: f64,
-    bins: BTreeMap<(i64, i64), Vec<(DVec2, usize)>>,
+    /// The first bin's column and row, and how many of each there are.
+    low: I64Vec2,
+    size: I64Vec2,
+    /// Row by row.
+    bins: Vec<Vec<(DVec2, usize)>>,
 }
 
 impl Grid {
     /// An empty grid whose bins have the given edge; queries cost least when their radius is about that.
     pub(crate) const fn new(edge: f64) -> Self {
-        Self { edge, bins: BTreeMap::new() }
+        Self { edge, low: I64Vec2::ZERO, size: I64Vec2::ZERO, bins: Vec::new() }
     }
 
     /// A grid of points, each with its place in `points`.
     pub(crate) fn of(points: &[DVec2], edge: f64) -> Self {
         let mut grid = Self::new(edge);
+        let low = points.iter().copied().reduce(DVec2::min);
+        let high = points.iter().copied().reduce(DVec2::max);
+        if let (Some(low), Some(high)) = (low, high) {
+            grid.widen(grid.bin(low), grid.bin(high));
+        }
         for (index, point) in points.iter().enumerate() {
             grid.insert(*point, index);
         }
@@ -26,17 +37,22 @@ impl Grid {
     }
 
     pub(crate) fn insert(&mut self, point: DVec2, index: usize) {
-        let (column, row) = self.bin(point);
-        self.bins.entry((row, column)).or_default().push((point, index));
+        let bin = self.bin(point);
+        if self.place(bin).is_none() {
+            self.widen(bin - SPARE, bin + SPARE);
+        }
+        if let Some(place) = self.place(bin) {
+            self.bins[place].push((point, index));
+        }
     }
 
     /// Indices and squared distances of the points within `radius`.
     pub(crate) fn within(&self, centre: DVec2, radius: f64) -> impl Iterator<Item = (usize, f64)> {
-        let low = self.bin(centre - DVec2::splat(radius));
-        let high = self.bin(centre + DVec2::splat(radius));
-        (low.1..=high.1)
-            .flat_map(move |row| self.bins.range((row, low.0)..=(row, high.0)))
-            .flat_map(|(_, points)| points)
+        let low = self.bin(centre - DVec2::splat(radius)).max(self.low);
+        let high = self.bin(centre + DVec2::splat(radius)).min(self.low + self.size - 1);
+        (low.y..=high.y)
+            .flat_map(move |row| (low.x..=high.x).filter_map(move |x| self.place(I64Vec2::new(x, row))))
+            .flat_map(|place| &self.bins[place])
             .map(move |(point, index)| (*index, point.distance_squared(centre)))
             .filter(move |(_, squared)| *squared <= radius * radius)
     }
@@ -48,9 +64,56 @@ impl Grid {
             .map(|(index, squared)| (index, squared.sqrt()))
     }
 
-    /// Bin of a point as (column, row).
-    #[expect(clippy::cast_possible_truncation, reason = "floor of a pixel coordinate in bins")]
-    fn bin(&self, point: DVec2) -> (i64, i64) {
-        ((point.x / self.edge).floor() as i64, (point.y / self.edge).floor() as i64)
+    /// Column and row of a point's bin.
+    fn bin(&self, point: DVec2) -> I64Vec2 {
+        (point / self.edge).floor().as_i64vec2()
+    }
+
+    /// Where a bin is stored.
+    fn place(&self, bin: I64Vec2) -> Option<usize> {
+        let at = bin - self.low;
+        let inside = at.cmpge(I64Vec2::ZERO).all() && at.cmplt(self.size).all();
+        inside.then_some(at).and_then(|at| usize::try_from(at.y * self.size.x + at.x).ok())
+    }
+
+    /// Makes room for the bins from `low` to `high`.
+    fn widen(&mut self, low: I64Vec2, high: I64Vec2) {
+        let (low, end) = if self.bins.is_empty() {
+            (low, high + 1)
+        } else {
+            (low.min(self.low), (high + 1).max(self.low + self.size))
+        };
+        let filled = std::mem::take(&mut self.bins);
+        (self.low, self.size) = (low, end - low);
+        let count = usize::try_from(self.size.x * self.size.y).unwrap_or(0);
+        self.bins = vec![Vec::new(); count];
+        for (point, index) in filled.into_iter().flatten() {
+            if let Some(place) = self.place(self.bin(point)) {
+                self.bins[place].push((point, index));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_point_is_found_wherever_it_was_put() {
+        let spiral = |k: usize| DVec2::from_angle(k as f64) * k as f64 * 0.7;
+        let points: Vec<DVec2> = (0..60).map(spiral).collect();
+        let mut grown = Grid::new(3.0);
+        points.iter().enumerate().for_each(|(index, point)| grown.insert(*point, index));
+        for grid in [grown, Grid::of(&points, 3.0)] {
+            for (radius, centre) in [(2.0, DVec2::ZERO), (9.0, spiral(31)), (200.0, DVec2::X)] {
+                let mut found: Vec<usize> = grid.within(centre, radius).map(|(index, _)| index).collect();
+                found.sort_unstable();
+                let near = |k: &usize| points[*k].distance(centre) <= radius;
+                assert_eq!(found, (0..60).filter(near).collect::<Vec<usize>>());
+            }
+            assert_eq!(grid.nearest(spiral(40) + 0.1, 5.0).map(|(index, _)| index), Some(40));
+            assert_eq!(grid.nearest(DVec2::splat(1e4), 5.0), None);
+        }
     }
 }

@@ -14,6 +14,7 @@ use super::{
 };
 use glam::DVec2;
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
 /// Pixels per pitch at which a scale is tried. Below 8 the walls are lost, above 12 it only costs time.
 const LEVEL_PITCH: f64 = 8.0;
@@ -27,9 +28,9 @@ const LEVEL_AREA: f64 = 4.0e5;
 const TILE: f64 = 200.0;
 
 /// Bright spots in the middle of dark cells make, with the walls' corners, a finer lattice of √3 times less pitch. So a lattice
-/// coarser by more than this factor is preferred if it covers this share of what the finer one does. A comb read at its
-/// right pitch shows nothing regular at coarser scales.
-const COARSER: f64 = 1.5;
+/// coarser by about this factor is preferred if it covers this share of what the finer one does. A comb read at its right
+/// pitch shows nothing regular at such scales; at much coarser ones whole pieces of comb may stand in a hexagon.
+const COARSER: RangeInclusive<f64> = 1.5..=2.2;
 const SUPERLATTICE: f64 = 0.5;
 
 /// Whether cells are darker or brighter than their walls.
@@ -73,7 +74,7 @@ pub(crate) fn find(pyramid: &Pyramid<'_>, hint: Option<f64>) -> Option<PitchEsti
         among.copied().max_by(|a, b| a.coverage.total_cmp(&b.coverage))
     };
     let best = greatest(&mut tried.iter())?;
-    let coarser = greatest(&mut tried.iter().filter(|t| t.pitch > COARSER * best.pitch));
+    let coarser = greatest(&mut tried.iter().filter(|t| COARSER.contains(&(t.pitch / best.pitch))));
     Some(coarser.filter(|c| c.coverage > SUPERLATTICE * best.coverage).unwrap_or(best))
 }
 

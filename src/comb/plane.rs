@@ -145,16 +145,22 @@ impl Plane {
 
     fn convolved_rows(&self, half: &[f32]) -> Self {
         let (width, reach) = (self.width, half.len() - 1);
+        let inner = reach..width.saturating_sub(reach).max(reach);
         let mut out = Self::new(width, self.height, 0.0);
         out.fill_rows(|y, row| {
             let source = self.row(y);
-            for (x, v) in row.iter_mut().enumerate() {
-                if x >= reach && x + reach < width {
-                    let window = &source[x - reach..=x + reach];
-                    *v = half[0] * window[reach]
-                        + (1..=reach).map(|k| half[k] * (window[reach - k] + window[reach + k])).sum::<f32>();
-                } else {
-                    *v = border_mean(half, x, width, |k| source[k]);
+            for (x, v) in row.iter_mut().enumerate().filter(|(x, _)| !inner.contains(x)) {
+                *v = border_mean(half, x, width, |k| source[k]);
+            }
+            // One weight after the other, over the whole row, which a processor does several pixels at a time.
+            let Some(row) = row.get_mut(inner.clone()) else { return };
+            let shifted = |by: usize| &source[by..by + inner.len()];
+            for (v, s) in row.iter_mut().zip(shifted(reach)) {
+                *v = half[0] * s;
+            }
+            for (k, weight) in half.iter().enumerate().skip(1) {
+                for ((v, a), b) in row.iter_mut().zip(shifted(reach - k)).zip(shifted(reach + k)) {
+                    *v += weight * (a + b);
                 }
             }
         });

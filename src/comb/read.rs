@@ -10,6 +10,7 @@ use super::{
     plane::{Plane, pixel},
     raster::Pyramid,
     sides::{self, Cells, Count},
+    smooth,
     survey::{Survey, survey},
     walls::{self, Region, Wall},
     watershed::{self, Segmentation},
@@ -26,6 +27,8 @@ const LEAST_WORK_PITCH: f64 = 24.0;
 pub const LEAST_PITCH: f64 = 11.0;
 /// Share of the photograph that must look like comb.
 pub(crate) const LEAST_COVERAGE: f64 = 0.012;
+/// Pixels of the working raster, along each axis, per pixel of the first flood.
+const COARSE: usize = 2;
 /// Smoothing of the relief, in pitches.
 const RELIEF_BLUR: f64 = 0.03;
 
@@ -153,16 +156,9 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let relief = survey.relief.blurred(RELIEF_BLUR * pitch);
     let mut centres: Vec<DVec2> = survey.sites.iter().map(|s| s.position).collect();
     let pitches: Vec<f64> = centres.iter().map(|c| survey.field.at(*c)).collect();
-    let first = watershed::flood(&relief, &centres, &pitches, hidden);
-    let reaches: Vec<f64> = pitches.iter().map(|p| watershed::REACH * p).collect();
-    let regions = walls::regions(&first, &relief, &centres, &pitches, &reaches);
-    for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
-        if site.depth == 0 && region.area > 0.0 && !region.on_border {
-            *centre = region.centroid;
-        }
-    }
+    centre(&mut centres, survey, &relief, &pitches, hidden);
     let mut segmentation = watershed::flood(&relief, &centres, &pitches, hidden);
-    let regions = walls::regions(&segmentation, &relief, &centres, &pitches, &reaches);
+    let regions = walls::regions(&segmentation, &relief, &centres, &pitches);
     let walls = walls::walls(&segmentation, &relief, &regions);
     let mut into = halves(&survey.sites, &regions, &walls, &pitches);
     for (a, b) in joined {
@@ -178,13 +174,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let markers: Vec<DVec2> = kept.iter().map(|i| centres[*i]).collect();
     let by_hand =
         kept.iter().map(|i| survey.sites[*i].by_hand || joined.iter().any(|(a, _)| a == i)).collect();
-    let mut reaches = vec![0.0; kept.len()];
-    for (old, centre) in centres.iter().enumerate() {
-        let new = place[into[old]];
-        let reach = centre.distance(markers[new]) + watershed::REACH * survey.field.at(*centre);
-        reaches[new] = f64::max(reaches[new], reach);
-    }
-    let regions = walls::regions(&segmentation, &relief, &markers, &pitches, &reaches);
+    let regions = walls::regions(&segmentation, &relief, &markers, &pitches);
     let walls = walls::walls(&segmentation, &relief, &regions);
     let centres = regions
         .iter()
@@ -192,6 +182,26 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
         .map(|(r, m)| if r.area > 0.0 && !r.on_border { r.centroid } else { *m })
         .collect();
     Segmented { segmentation, relief, centres, markers, by_hand, pitches, regions, walls }
+}
+
+/// Moves the cells that were found to the middle of what a first flood gives them. Half the resolution is enough for that.
+fn centre(centres: &mut [DVec2], survey: &Survey, relief: &Plane, pitches: &[f64], hidden: Option<&[bool]>) {
+    let (width, fill) = (relief.width(), |y: usize, row: &mut [f32]| row.copy_from_slice(relief.row(y)));
+    let coarse = smooth::reduced(width, relief.height(), COARSE, fill);
+    let hidden: Option<Vec<bool>> = hidden.map(|hidden| {
+        let at = |i: usize| COARSE * (i / coarse.width() * width + i % coarse.width());
+        (0..coarse.width() * coarse.height()).map(|i| hidden[at(i)]).collect()
+    });
+    let unit = COARSE as f64;
+    let markers: Vec<DVec2> = centres.iter().map(|c| *c / unit).collect();
+    let pitches: Vec<f64> = pitches.iter().map(|p| p / unit).collect();
+    let first = watershed::flood(&coarse, &markers, &pitches, hidden.as_deref());
+    let regions = walls::regions(&first, &coarse, &markers, &pitches);
+    for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
+        if site.depth == 0 && region.area > 0.0 && !region.on_border {
+            *centre = region.centroid * unit;
+        }
+    }
 }
 
 /// Cells that were found as two halves, having no wall between them: for each, the one that it joins. Two blobs may be

@@ -63,16 +63,9 @@ impl Segmentation {
         }
     }
 
-    /// Which of the `columns` of row `y` have a label.
-    pub(crate) fn places(
-        &self,
-        label: u32,
-        y: usize,
-        columns: Range<usize>,
-    ) -> impl Iterator<Item = usize> + use<'_> {
-        let first = columns.start;
-        let row = &self.labels[y * self.width..(y + 1) * self.width][columns];
-        row.iter().enumerate().filter(move |(_, l)| **l == label).map(move |(x, _)| first + x)
+    /// The labels of a row.
+    pub(crate) fn row(&self, y: usize) -> &[u32] {
+        &self.labels[y * self.width..(y + 1) * self.width]
     }
 
     /// The label of a pixel.

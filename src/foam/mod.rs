@@ -19,11 +19,20 @@
 //! | one bubble, held or free, and the landscape of its energy | `bubble/` |
 //! | foams of two layers, as in natural comb | `layers/` |
 //!
-//! Not promised: a relaxed foam is a local minimum; other seeds may lie lower. Energies are those of the mesh: their error
-//! falls with the fourth power of the number of elements along a film and is 1e-5 with the default on a foam of 64 cells.
-//! Networks have three cells at every vertex, so that a sphere needs four cells or more. Relaxation knows periodic and closed
-//! surfaces only, not plane walls across the gap; where level-set walls lie as far apart as Φ = ±0.86 on the P-surface it stalls.
-//! Seeds without annealing or polish settle too, but in a hundred steps where films crumple on the way.
+//! Not promised: a relaxed foam is a local minimum; other seeds may lie lower, and annealing (`relax/anneal.rs`) finds some of
+//! them. Energies are those of the mesh: their error falls with the fourth power of the number of elements along a film, is
+//! 1e-5 with the default on a foam of 64 cells, and can be extrapolated away. Networks have three cells at every vertex and
+//! three sides or more, so that a sphere needs four cells. Relaxation knows periodic and closed surfaces only, not plane walls
+//! across the gap: a foam of an enclosure fills one whole period of its gap, not the half that is printed.
+//!
+//! One layer means that cells have the same neighbours on both walls. Where walls are far apart for their curvature there is
+//! no such foam: on the P-surface beyond about Φ = ±0.7, where a film is squeezed to nothing on the inner side of a neck while
+//! it is long on the outer. `relax/widen.rs` goes as far as there is one and says where the next one ends.
+//!
+//! Films meet walls at a right angle, and no other angle is offered: Young's law for a film between the cells *a* and *b* is
+//! cos θ = (γ_wa − γ_wb)/γ with the wall's energies γ_w under each, and these are the same where all cells hold the same gas
+//! between the same walls. Cells do not vanish (T2) in a relaxation, for their volumes are held; the network knows how
+//! ([`network::Network::remove`]), for a foam that coarsens.
 //!
 //! Sources: K. A. Brakke, "The Surface Evolver", Experimental Mathematics 1 (1992), for films as minimised energies;
 //! J. Nocedal and S. Wright, "Numerical Optimization" (2006), for Newton steps under constraints and inertia.

@@ -143,6 +143,29 @@ impl FoamSpace {
         }
     }
 
+    /// The same space between walls nearer to the middle surface, as [`Gap::narrowed`].
+    #[must_use]
+    pub fn narrowed(self, part: f64) -> Self {
+        let radii = |[inner, outer]: [f64; 2]| {
+            let (mean, half) = (0.5 * (inner + outer), 0.5 * part * (outer - inner));
+            [mean - half, mean + half]
+        };
+        match self {
+            // Exactly as it was typed, without the rounding of means.
+            whole if part >= 1.0 => whole,
+            Self::Periodic { kind, period, walls } => {
+                let walls = match walls {
+                    PeriodicWalls::LevelSet { delta } => PeriodicWalls::LevelSet { delta: part * delta },
+                    PeriodicWalls::Parallel { gap } => PeriodicWalls::Parallel { gap: part * gap },
+                };
+                Self::Periodic { kind, period, walls }
+            }
+            Self::Sphere { radii: both } => Self::Sphere { radii: radii(both) },
+            Self::Torus { ring, tubes } => Self::Torus { ring, tubes: radii(tubes) },
+            Self::Plane { periods, height } => Self::Plane { periods, height: part * height },
+        }
+    }
+
     /// How space ends: one period, or open round a bounded gap.
     ///
     /// # Errors
@@ -236,6 +259,25 @@ mod tests {
         ] {
             assert!(space.gap().is_err(), "{space}");
         }
+    }
+
+    #[test]
+    fn a_narrowed_space_has_the_narrowed_gap() -> Result<(), SpaceError> {
+        let kind = PeriodicSurface::SchwarzP;
+        for space in [
+            FoamSpace::Sphere { radii: [1.0, 1.2] },
+            FoamSpace::Torus { ring: 5.0, tubes: [0.9, 1.0] },
+            FoamSpace::Plane { periods: [3.0, 4.0], height: 0.5 },
+            FoamSpace::Periodic { kind, period: 2.0, walls: PeriodicWalls::LevelSet { delta: 0.4 } },
+            FoamSpace::Periodic { kind, period: 2.0, walls: PeriodicWalls::Parallel { gap: 0.1 } },
+        ] {
+            let (one, other) = (space.narrowed(0.3).gap()?, space.gap()?.narrowed(0.3));
+            for (a, b) in one.walls().iter().zip(other.walls()) {
+                // Means and halves of numbers of the order of 1: a few roundings.
+                assert!((a.level - b.level).abs() < 1e-15, "{space}: {} {}", a.level, b.level);
+            }
+        }
+        Ok(())
     }
 
     #[test]

@@ -35,7 +35,9 @@ mod tri_mesh;
 
 pub use bvh::{Bvh, Closest};
 pub use check::MeshDefect;
-pub use format::{Part, WriteError, write_3mf, write_glb, write_obj, write_ply, write_stl};
+pub use format::{
+    GltfError, GltfFile, Part, WriteError, write_3mf, write_glb, write_obj, write_ply, write_stl,
+};
 pub use grid::Grid;
 pub use intersect::self_intersections;
 pub use march::march;

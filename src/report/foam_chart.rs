@@ -5,7 +5,11 @@ use super::{
     palette::{BLUE, Colour, INK, ORANGE},
 };
 use crate::foam::{checkpoint::StepRecord, seeds::TracePoint};
-use plotters::{chart::DualCoordChartContext, coord::ranged1d::Ranged, prelude::*};
+use plotters::{
+    coord::ranged1d::{AsRangedCoord, ValueFormatter},
+    prelude::*,
+};
+use std::ops::Range;
 
 /// A chart that could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -29,45 +33,26 @@ fn failed(error: impl std::fmt::Display) -> ChartError {
 /// # Errors
 /// [`ChartError`] if the chart cannot be drawn, as for an empty record.
 pub fn annealing(trace: &[TracePoint]) -> Result<Figure, ChartError> {
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        root.fill(&WHITE).map_err(failed)?;
-        let sweeps = trace.last().map_or(1.0, |record| as_f64(record.sweep));
-        let most = trace.iter().map(|record| record.energy).fold(f64::MIN_POSITIVE, f64::max);
-        let mut chart = ChartBuilder::on(&root)
-            .caption("Annealing of the seeds", (FONT, 22).into_font().color(&rgb(INK)))
-            .margin(14)
-            .x_label_area_size(48)
-            .y_label_area_size(74)
-            .right_y_label_area_size(64)
-            .build_cartesian_2d(0.0..sweeps, 0.0..1.05 * most)
-            .map_err(failed)?
-            .set_secondary_coord(0.0..sweeps, 0.0..1.0);
-        style(&mut chart)?;
-        let energy = trace.iter().map(|record| (as_f64(record.sweep), record.energy));
-        chart
-            .draw_series(LineSeries::new(energy, rgb(BLUE).stroke_width(2)))
-            .map_err(failed)?
-            .label("energy")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], rgb(BLUE).stroke_width(2)));
-        let order = trace.iter().map(|record| (as_f64(record.sweep), record.psi6));
-        chart
-            .draw_secondary_series(LineSeries::new(order, rgb(ORANGE).stroke_width(2)))
-            .map_err(failed)?
-            .label("order |ψ6|")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], rgb(ORANGE).stroke_width(2)));
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .label_font((FONT, 15).into_font().color(&rgb(INK)))
-            .border_style(rgb(INK).mix(0.3))
-            .background_style(WHITE.mix(0.8))
-            .draw()
-            .map_err(failed)?;
-        root.present().map_err(failed)?;
-    }
-    Ok(Figure::from_svg(svg))
+    let sweeps = |record: &TracePoint| as_f64(record.sweep);
+    let most = trace.iter().map(|record| record.energy).fold(f64::MIN_POSITIVE, f64::max);
+    let chart = TwoLines {
+        title: "Annealing of the seeds",
+        across: ("sweeps", 0.0..trace.last().map_or(1.0, sweeps)),
+        left: Line {
+            axis: "energy of all seeds / d²",
+            label: "energy",
+            points: trace.iter().map(|record| (sweeps(record), record.energy)).collect(),
+            tick: |value| format!("{value:.1}"),
+        },
+        left_range: 0.0..1.05 * most,
+        right: Line {
+            axis: "bond-orientational order |ψ6|",
+            label: "order |ψ6|",
+            points: trace.iter().map(|record| (sweeps(record), record.psi6)).collect(),
+            tick: |value| format!("{value:.1}"),
+        },
+    };
+    chart.drawn(0.0..1.0)
 }
 
 /// The relaxation: energy and residual against Newton steps.
@@ -75,57 +60,99 @@ pub fn annealing(trace: &[TracePoint]) -> Result<Figure, ChartError> {
 /// # Errors
 /// [`ChartError`] if the chart cannot be drawn.
 pub fn relaxation(record: &[StepRecord]) -> Result<Figure, ChartError> {
-    let mut svg = String::new();
+    let (first, last) = (record.first().map_or(0, |r| r.step), record.last().map_or(1, |r| r.step));
+    let energies = || record.iter().map(|r| r.energy);
+    let (low, high) = (energies().fold(f64::INFINITY, f64::min), energies().fold(f64::MIN, f64::max));
+    let room = (0.05 * (high - low)).max(1e-6 * high.abs());
+    let force = |r: &StepRecord| r.force.clamp(1e-16, 1e3);
+    let chart = TwoLines {
+        title: "Relaxation of the films",
+        across: ("Newton steps", as_f64(first)..as_f64(last.max(first + 1))),
+        left: Line {
+            axis: "energy / (tension L²)",
+            label: "energy",
+            points: record.iter().map(|r| (as_f64(r.step), r.energy)).collect(),
+            tick: |value| format!("{value:.5}"),
+        },
+        left_range: low - room..high + room,
+        right: Line {
+            axis: "largest force / (tension × cell width)",
+            label: "largest force",
+            points: record.iter().map(|r| (as_f64(r.step), force(r))).collect(),
+            tick: |value| format!("{value:.0e}"),
+        },
+    };
+    chart.drawn((1e-15..1e1).log_scale())
+}
+
+/// Two lines over one axis, each with a scale of its own.
+struct TwoLines {
+    title: &'static str,
+    across: (&'static str, Range<f64>),
+    left: Line,
+    left_range: Range<f64>,
+    right: Line,
+}
+
+struct Line {
+    axis: &'static str,
+    label: &'static str,
+    points: Vec<(f64, f64)>,
+    tick: fn(&f64) -> String,
+}
+
+impl TwoLines {
+    fn drawn<R>(&self, right_range: R) -> Result<Figure, ChartError>
+    where
+        R: AsRangedCoord<Value = f64>,
+        R::CoordDescType: ValueFormatter<f64>,
     {
+        let mut svg = String::new();
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         root.fill(&WHITE).map_err(failed)?;
-        let (first, last) = (record.first().map_or(0, |r| r.step), record.last().map_or(1, |r| r.step));
-        let steps = as_f64(first)..as_f64(last.max(first + 1));
-        let energies = || record.iter().map(|r| r.energy);
-        let (low, high) = (energies().fold(f64::INFINITY, f64::min), energies().fold(f64::MIN, f64::max));
-        let room = (0.05 * (high - low)).max(1e-6 * high.abs());
-        let force = |r: &StepRecord| r.force.clamp(1e-16, 1e3);
+        let (across, steps) = &self.across;
         let mut chart = ChartBuilder::on(&root)
-            .caption("Relaxation of the films", (FONT, 22).into_font().color(&rgb(INK)))
+            .caption(self.title, (FONT, 22).into_font().color(&rgb(INK)))
             .margin(14)
             .x_label_area_size(48)
             .y_label_area_size(84)
             .right_y_label_area_size(74)
-            .build_cartesian_2d(steps.clone(), low - room..high + room)
+            .build_cartesian_2d(steps.clone(), self.left_range.clone())
             .map_err(failed)?
-            .set_secondary_coord(steps, (1e-15..1e1).log_scale());
+            .set_secondary_coord(steps.clone(), right_range);
         let text = || (FONT, 15).into_font().color(&rgb(INK));
         chart
             .configure_mesh()
-            .x_desc("Newton steps")
-            .y_desc("energy / (tension L²)")
+            .x_desc(*across)
+            .y_desc(self.left.axis)
             .axis_desc_style(text())
             .label_style(text())
             .x_label_formatter(&|value| format!("{value:.0}"))
-            .y_label_formatter(&|value| format!("{value:.5}"))
+            .y_label_formatter(&self.left.tick)
             .light_line_style(WHITE)
             .draw()
             .map_err(failed)?;
         chart
             .configure_secondary_axes()
-            .y_desc("largest force / (tension × cell width)")
-            .y_label_formatter(&|value| format!("{value:.0e}"))
+            .y_desc(self.right.axis)
+            .y_label_formatter(&self.right.tick)
             .axis_desc_style(text())
             .label_style(text())
             .draw()
             .map_err(failed)?;
-        let line = record.iter().map(|r| (as_f64(r.step), r.energy));
+        let sample =
+            |colour| move |(x, y)| PathElement::new([(x, y), (x + 24, y)], rgb(colour).stroke_width(2));
+        let line = |line: &Line, colour| LineSeries::new(line.points.clone(), rgb(colour).stroke_width(2));
         chart
-            .draw_series(LineSeries::new(line, rgb(BLUE).stroke_width(2)))
+            .draw_series(line(&self.left, BLUE))
             .map_err(failed)?
-            .label("energy")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], rgb(BLUE).stroke_width(2)));
-        let line = record.iter().map(|r| (as_f64(r.step), force(r)));
+            .label(self.left.label)
+            .legend(sample(BLUE));
         chart
-            .draw_secondary_series(LineSeries::new(line, rgb(ORANGE).stroke_width(2)))
+            .draw_secondary_series(line(&self.right, ORANGE))
             .map_err(failed)?
-            .label("largest force")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], rgb(ORANGE).stroke_width(2)));
+            .label(self.right.label)
+            .legend(sample(ORANGE));
         chart
             .configure_series_labels()
             .position(SeriesLabelPosition::UpperRight)
@@ -135,8 +162,9 @@ pub fn relaxation(record: &[StepRecord]) -> Result<Figure, ChartError> {
             .draw()
             .map_err(failed)?;
         root.present().map_err(failed)?;
+        drop((chart, root));
+        Ok(Figure::from_svg(svg))
     }
-    Ok(Figure::from_svg(svg))
 }
 
 /// How the energies of many runs are distributed: a histogram.
@@ -196,40 +224,6 @@ pub fn energies(energies: &[f64]) -> Result<Figure, ChartError> {
 
 /// Bars of the histogram.
 const BINS: u32 = 24;
-
-type Annealing<'a, 'b, X, Y> = DualCoordChartContext<
-    'a,
-    SVGBackend<'b>,
-    Cartesian2d<X, Y>,
-    Cartesian2d<X, plotters::coord::types::RangedCoordf64>,
->;
-
-/// Axis titles and tick labels.
-fn style<X, Y>(chart: &mut Annealing<'_, '_, X, Y>) -> Result<(), ChartError>
-where
-    X: Ranged<ValueType = f64> + plotters::coord::ranged1d::ValueFormatter<f64>,
-    Y: Ranged<ValueType = f64> + plotters::coord::ranged1d::ValueFormatter<f64>,
-{
-    let text = || (FONT, 15).into_font().color(&rgb(INK));
-    chart
-        .configure_mesh()
-        .x_desc("sweeps")
-        .y_desc("energy of all seeds / d²")
-        .axis_desc_style(text())
-        .label_style(text())
-        .x_label_formatter(&|value| format!("{value:.0}"))
-        .y_label_formatter(&|value| format!("{value:.1}"))
-        .light_line_style(WHITE)
-        .draw()
-        .map_err(failed)?;
-    chart
-        .configure_secondary_axes()
-        .y_desc("bond-orientational order |ψ6|")
-        .axis_desc_style(text())
-        .label_style(text())
-        .draw()
-        .map_err(failed)
-}
 
 #[expect(clippy::cast_precision_loss, reason = "sweeps lie far below 2^53")]
 const fn as_f64(count: usize) -> f64 {

@@ -6,20 +6,14 @@ use super::{
 };
 use crate::{
     index::{Id, checked_u32},
+    mesh::GltfFile,
     surface::WallSide,
 };
 use glam::DVec3;
-use gltf::{
-    Glb,
-    binary::Header,
-    json::{
-        Accessor, Asset, Buffer, Index, Mesh, Node, Root, Scene,
-        accessor::{ComponentType, GenericComponentType, Type},
-        buffer::{Target, View},
-        material::{AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor},
-        mesh::{Mode, Primitive, Semantic},
-        validation::{Checked, USize64},
-    },
+use gltf::json::{
+    Material,
+    material::{AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor},
+    validation::Checked,
 };
 use std::{
     collections::BTreeMap,
@@ -115,130 +109,39 @@ pub fn write_glb(writer: &mut impl Write, pieces: &[Piece], figures: &CellFigure
             PieceKind::Wall(WallSide::Upper) => {}
         }
     }
-    let mut file = Gltf { root: Root::default(), bytes: Vec::new(), buffer: Index::new(0) };
+    let mut file = GltfFile::with_capacity(0);
     for (sides, group) in groups {
-        file.add(sides, &group);
+        add_group(&mut file, sides, &group);
     }
-    writer.write_all(&file.finished()?)
+    writer.write_all(&file.finished().map_err(io::Error::other)?)
 }
 
 /// Films in glTF are the colour of wax and let this much light through.
 const FILM: (Colour, f32) = (Colour([0xd8, 0xc6, 0x9a]), 0.6);
 
-struct Gltf {
-    root: Root,
-    bytes: Vec<u8>,
-    buffer: Index<Buffer>,
-}
-
-impl Gltf {
-    /// One mesh of one colour: films (`None`), or floors of cells with so many sides.
-    fn add(&mut self, sides: Option<u32>, group: &[&Piece]) {
-        let (mut places, mut corners) = (Vec::new(), Vec::new());
-        for piece in group {
-            let first = checked_u32(places.len());
-            // glTF has y up.
-            places.extend(piece.points.iter().map(|p| DVec3::new(p.x, p.z, -p.y).as_vec3().to_array()));
-            for polygon in &piece.polygons {
-                for at in 1..polygon.len() - 1 {
-                    corners.extend([0, at, at + 1].map(|at| first + checked_u32(polygon[at])));
-                }
+/// One mesh of one colour: films (`None`), or floors of cells with so many sides.
+fn add_group(file: &mut GltfFile, sides: Option<u32>, group: &[&Piece]) {
+    let (mut places, mut corners) = (Vec::new(), Vec::new());
+    for piece in group {
+        let first = checked_u32(places.len());
+        // glTF has y up.
+        places.extend(piece.points.iter().map(|p| DVec3::new(p.x, p.z, -p.y).as_vec3().to_array()));
+        for polygon in &piece.polygons {
+            for at in 1..polygon.len() - 1 {
+                corners.extend([0, at, at + 1].map(|at| first + checked_u32(polygon[at])));
             }
         }
-        let start = self.bytes.len();
-        self.bytes.extend(places.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
-        let view = self.view(start, Target::ArrayBuffer);
-        let mut positions = accessor(view, places.len(), ComponentType::F32, Type::Vec3);
-        let fold = |pick: fn(f32, f32) -> f32, start: f32| {
-            places.iter().fold([start; 3], |all, p| std::array::from_fn(|axis| pick(all[axis], p[axis])))
-        };
-        positions.min = Some(serde_json::json!(fold(f32::min, f32::INFINITY)));
-        positions.max = Some(serde_json::json!(fold(f32::max, f32::NEG_INFINITY)));
-        let positions = self.root.push(positions);
-        let start = self.bytes.len();
-        self.bytes.extend(corners.iter().flat_map(|corner: &u32| corner.to_le_bytes()));
-        let view = self.view(start, Target::ElementArrayBuffer);
-        let indices = self.root.push(accessor(view, corners.len(), ComponentType::U32, Type::Scalar));
-        let name = sides.map_or_else(|| "films".to_owned(), |sides| format!("cells with {sides} sides"));
-        let material = self.root.push(material(sides, &name));
-        let primitive = Primitive {
-            attributes: BTreeMap::from([(Checked::Valid(Semantic::Positions), positions)]),
-            indices: Some(indices),
-            mode: Checked::Valid(Mode::Triangles),
-            material: Some(material),
-            extensions: None,
-            extras: Default::default(),
-            targets: None,
-        };
-        let mesh = Mesh {
-            name: Some(name.clone()),
-            primitives: vec![primitive],
-            extensions: None,
-            extras: Default::default(),
-            weights: None,
-        };
-        let mesh = Some(self.root.push(mesh));
-        self.root.push(Node { name: Some(name), mesh, ..Node::default() });
     }
-
-    /// The data from `start` on.
-    fn view(&mut self, start: usize, target: Target) -> Index<View> {
-        self.root.push(View {
-            buffer: self.buffer,
-            byte_offset: Some(USize64::from(start)),
-            byte_length: USize64::from(self.bytes.len() - start),
-            byte_stride: None,
-            name: None,
-            target: Some(Checked::Valid(target)),
-            extensions: None,
-            extras: Default::default(),
-        })
-    }
-
-    fn finished(self) -> io::Result<Vec<u8>> {
-        let Self { mut root, bytes, .. } = self;
-        root.asset = Asset { generator: Some("combwright".to_owned()), ..Asset::default() };
-        let nodes = (0..root.nodes.len()).map(|index| Index::new(checked_u32(index))).collect();
-        let scene = root.push(Scene { nodes, name: None, extensions: None, extras: Default::default() });
-        root.scene = Some(scene);
-        root.push(Buffer {
-            byte_length: USize64::from(bytes.len()),
-            name: None,
-            uri: None,
-            extensions: None,
-            extras: Default::default(),
-        });
-        let json = gltf::json::serialize::to_vec(&root)?;
-        // The container's header and those of its two chunks, and the padding of both.
-        let length = 12 + 8 + json.len().next_multiple_of(4) + 8 + bytes.len().next_multiple_of(4);
-        let length = u32::try_from(length).map_err(io::Error::other)?;
-        let header = Header { magic: *b"glTF", version: 2, length };
-        Glb { header, json: json.into(), bin: Some(bytes.into()) }.to_vec().map_err(io::Error::other)
-    }
+    let name = sides.map_or_else(|| "films".to_owned(), |sides| format!("cells with {sides} sides"));
+    let material = file.add_material(material(sides, &name));
+    file.add_mesh(&name, &places, corners.into_iter(), Some(material), None);
 }
 
-fn accessor(view: Index<View>, count: usize, component: ComponentType, shape: Type) -> Accessor {
-    Accessor {
-        buffer_view: Some(view),
-        byte_offset: None,
-        count: USize64::from(count),
-        component_type: Checked::Valid(GenericComponentType(component)),
-        type_: Checked::Valid(shape),
-        min: None,
-        max: None,
-        name: None,
-        normalized: false,
-        sparse: None,
-        extensions: None,
-        extras: Default::default(),
-    }
-}
-
-fn material(sides: Option<u32>, name: &str) -> gltf::json::Material {
+fn material(sides: Option<u32>, name: &str) -> Material {
     let (colour, alpha) = sides.map_or(FILM, |sides| (palette::of_sides(sides), 1.0));
     // glTF wants linear light; the square is near enough to the sRGB curve.
     let [r, g, b] = colour.0.map(|byte| (f32::from(byte) / 255.0).powi(2));
-    gltf::json::Material {
+    Material {
         name: Some(name.to_owned()),
         alpha_mode: Checked::Valid(if sides.is_some() { AlphaMode::Opaque } else { AlphaMode::Blend }),
         double_sided: true,
@@ -248,6 +151,6 @@ fn material(sides: Option<u32>, name: &str) -> gltf::json::Material {
             roughness_factor: StrengthFactor(0.7),
             ..PbrMetallicRoughness::default()
         },
-        ..gltf::json::Material::default()
+        ..Material::default()
     }
 }

@@ -185,6 +185,13 @@ impl Gap {
         Ok(Self { middle: surface, walls, kind: GapKind::Parallel })
     }
 
+    /// The same gap between walls nearer to the middle surface: both levels are multiplied by `part`.
+    #[must_use]
+    pub fn narrowed(&self, part: f64) -> Self {
+        let walls = self.walls.clone().map(|wall| Wall { level: part * wall.level, ..wall });
+        Self { middle: self.middle.clone(), walls, kind: self.kind }
+    }
+
     /// The middle surface: level 0 of this.
     #[must_use]
     pub fn middle(&self) -> &Arc<dyn LevelSet> {

@@ -3,12 +3,27 @@
 //! Newton steps on a coarse mesh, damped so that no film turns over, with T1s wherever a film has shrunk; then the final mesh
 //! and Newton steps to the end. Between steps nodes are spread evenly along the films and the wall patches integrated anew.
 //! How it ended is data ([`Stop`]); a run that cannot go on gives back the last good state.
+//!
+//! | step | file |
+//! |---|---|
+//! | the whole run | this page |
+//! | what a run is in the middle of, as data | `state.rs` |
+//! | least energy of any film complex, topology fixed | `descend.rs` |
+//! | walls far apart: relaxed in a narrow gap that is widened | `widen.rs` |
+//! | disturbed and relaxed again, keeping what is lower | `anneal.rs` |
+//! | the energy without the error of the mesh | `extrapolate.rs` |
 
+mod anneal;
 mod descend;
+mod extrapolate;
 mod state;
+mod widen;
 
+pub use anneal::{AnnealSettings, Annealed, anneal};
 pub use descend::{Descended, Descent, DescentSettings, DescentStep, Ending};
+pub use extrapolate::{Extrapolated, extrapolate};
 pub use state::{STATE_SCHEMA, State};
+pub use widen::Pinch;
 
 use super::{
     complex::{NoExtrusion, Strips},
@@ -77,6 +92,15 @@ pub enum Stop {
         /// Newton steps taken.
         steps: usize,
     },
+    /// The gap is too wide for one layer of these cells; the state is the foam in the part of it that was reached.
+    TooWide {
+        /// Newton steps taken.
+        steps: usize,
+        /// The part, as in [`State::part`].
+        part: f64,
+        /// The film that has all but vanished on one wall there; none if something else is in the way.
+        pinch: Option<Pinch>,
+    },
 }
 
 /// What is told after each Newton step.
@@ -141,13 +165,29 @@ pub fn relax(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
     let shares = shares(&network, settings.shares.as_deref())?;
+    resume(first_state(network, gap, shares)?, gap, settings, progress)
+}
+
+/// The coarse films of a network, from wall to wall; in the midst of the gap where its walls are too steep to start from.
+fn first_state(network: Network, gap: &Gap, shares: IndexVec<CellId, f64>) -> Result<State, NoExtrusion> {
+    match laid(network.clone(), gap, shares.clone()) {
+        Ok(state) if !widen::is_steep(&state) => Ok(state),
+        _ => {
+            let narrow = laid(network, &gap.narrowed(widen::FIRST_PART), shares)?;
+            Ok(State { part: widen::FIRST_PART, ..narrow })
+        }
+    }
+}
+
+fn laid(network: Network, gap: &Gap, shares: IndexVec<CellId, f64>) -> Result<State, NoExtrusion> {
     let coarse = Strips { along: LEAST_ALONG, through: 1 };
-    let mut state = State::new(network, gap, coarse, shares)?;
+    let state = State::new(network, gap, coarse, shares)?;
     let along = elements_along(&state, gap);
     if along > coarse.along {
-        state = State::new(state.network, gap, Strips { along, ..coarse }, state.shares)?;
+        State::new(state.network, gap, Strips { along, ..coarse }, state.shares)
+    } else {
+        Ok(state)
     }
-    resume(state, gap, settings, progress)
 }
 
 /// The least number of elements along a film: with one, T1s happen on films that are only bent.
@@ -201,6 +241,20 @@ pub fn resume(
     settings: &RelaxSettings,
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
+    if state.part < 1.0 {
+        widen::widen(state, gap, settings, progress)
+    } else {
+        go_on(state, gap, settings, progress)
+    }
+}
+
+/// Goes on from a state that fills all of `gap`.
+fn go_on(
+    state: State,
+    gap: &Gap,
+    settings: &RelaxSettings,
+    progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Relaxed, RelaxError> {
     let mut run = Run::new(state, gap, settings)?;
     // The coarse mesh need not converge further than T1s can still happen.
     let stop = run.newton(COARSE_TOLERANCE, progress)?;
@@ -208,7 +262,7 @@ pub fn resume(
         Some(stop) => stop,
         None => run.finish(progress)?,
     };
-    Ok(Relaxed { state: run.state, stop, residuals: run.residuals, unstable: run.unstable })
+    Ok(run.ended(stop))
 }
 
 /// The lowest eigenvalue of the Hessian at constant volumes of a foam in balance; see [`super::solve::Mode`].
@@ -261,6 +315,10 @@ impl<'a> Run<'a> {
         let descent = state.descent(gap)?;
         let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
         Ok(Self { gap, settings, state, descent, residuals, unstable: 0, laid_anew: 0, refined: false })
+    }
+
+    fn ended(self, stop: Stop) -> Relaxed {
+        Relaxed { state: self.state, stop, residuals: self.residuals, unstable: self.unstable }
     }
 
     /// Newton steps with T1s until the residual is below `tolerance`; `None` then, otherwise why it stopped.

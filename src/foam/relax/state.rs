@@ -36,6 +36,15 @@ pub struct State {
     pub flips: usize,
     /// How often each edge has flipped: its threshold falls with each time, so that no edge flips back and forth for ever.
     pub flips_of_edge: IndexVec<EdgeId, u32>,
+    /// The part of the gap that the films fill so far, about its middle surface: the walls' levels are multiplied by it.
+    /// Below 1 while a steep gap is widened, and at the end where it cannot be.
+    #[serde(default = "whole")]
+    pub part: f64,
+}
+
+/// The part that is filled where nothing is said.
+const fn whole() -> f64 {
+    1.0
 }
 
 impl State {
@@ -53,7 +62,18 @@ impl State {
         let pressures = IndexVec::from_elem(0.0, network.cells().len());
         let flips_of_edge = IndexVec::from_elem(0, network.edges().len());
         let schema = STATE_SCHEMA.to_owned();
-        Ok(Self { schema, network, strips, places, pressures, shares, steps: 0, flips: 0, flips_of_edge })
+        Ok(Self {
+            schema,
+            network,
+            strips,
+            places,
+            pressures,
+            shares,
+            steps: 0,
+            flips: 0,
+            flips_of_edge,
+            part: whole(),
+        })
     }
 
     /// The descent from the present places.

@@ -8,7 +8,7 @@
 //! | 3MF | `three_mf.rs` | named parts, placed, in mm |
 //! | PLY, binary | `ply.rs` | one mesh, without a unit |
 //! | OBJ, text | `obj.rs` | named parts, placed by their coordinates |
-//! | GLB (binary glTF 2.0) | `glb.rs` | named parts, placed, in m with y up |
+//! | GLB (binary glTF 2.0) | `glb.rs`, `gltf_file.rs` | named parts, placed, in m with y up |
 //!
 //! All of them are read as single precision by some or all programs, and STL readers even find common corners by equal
 //! places. So every writer first rounds the places ([`rounded`]) and refuses a mesh that would then no longer be closed; the
@@ -18,12 +18,14 @@
 //! can cross.
 
 mod glb;
+mod gltf_file;
 mod obj;
 mod ply;
 mod stl;
 mod three_mf;
 
 pub use glb::write_glb;
+pub use gltf_file::{GltfError, GltfFile};
 pub use obj::write_obj;
 pub use ply::write_ply;
 pub use stl::write_stl;
@@ -87,22 +89,12 @@ pub enum WriteError {
     /// A part's name that some format cannot hold.
     #[error("the part name {0:?} is empty or holds a control character or one of < > & \" '; choose another")]
     Name(String),
-    /// More data than the format can hold.
-    #[error(
-        "the parts need {bytes} bytes and a {format} file ends at 4 GiB; use fewer cells or another format"
-    )]
-    TooLarge {
-        /// The format.
-        format: &'static str,
-        /// The size needed.
-        bytes: usize,
-    },
     /// The 3MF package could not be made.
     #[error("cannot write 3MF: {0}")]
     ThreeMf(Box<dyn std::error::Error + Send + Sync>),
     /// The glTF description could not be made.
     #[error("cannot write GLB: {0}")]
-    Gltf(Box<dyn std::error::Error + Send + Sync>),
+    Gltf(#[from] GltfError),
 }
 
 /// Refuses names that some format cannot hold.

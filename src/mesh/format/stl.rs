@@ -7,7 +7,7 @@ use crate::{
 };
 use glam::DVec3;
 use rayon::prelude::*;
-use std::io::Write;
+use std::{io::Write, sync::mpsc::sync_channel, thread};
 use stl_io::{Normal, Triangle, Vertex};
 
 /// Triangles that are packed by one thread in a row; what is packed and not yet written is bounded by a few times 50 bytes
@@ -31,14 +31,25 @@ pub fn write_stl(mesh: &ClosedMesh, writer: &mut impl Write) -> Result<(), Write
     let mut header = [0; HEADER_BYTES];
     header[HEADER_BYTES - 4..].copy_from_slice(&count.to_le_bytes());
     writer.write_all(&header)?;
-    for chunks in mesh.triangles.chunks(CHUNK * CHUNKS_AT_A_TIME) {
-        let packed: Vec<Vec<u8>> =
-            chunks.par_chunks(CHUNK).map(|chunk| packed(&places, chunk)).collect::<Result<_, _>>()?;
-        for bytes in packed {
-            writer.write_all(&bytes[HEADER_BYTES..])?;
+    thread::scope(|scope| {
+        // What is packed waits in a short queue while the writer, which may be slow, takes the bytes before it.
+        let (ready, packages) = sync_channel(1);
+        scope.spawn(move || {
+            for chunks in mesh.triangles.chunks(CHUNK * CHUNKS_AT_A_TIME) {
+                let packed: Result<Vec<Vec<u8>>, WriteError> =
+                    chunks.par_chunks(CHUNK).map(|chunk| packed(&places, chunk)).collect();
+                if ready.send(packed).is_err() {
+                    return;
+                }
+            }
+        });
+        for package in packages {
+            for bytes in package? {
+                writer.write_all(&bytes[HEADER_BYTES..])?;
+            }
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Some triangles as a whole STL file of their own.
