@@ -32,7 +32,7 @@ CASES = [
     ("phelanc.fe", "g 5; r; g 5; hessian; hessian; hessian"),
     ("quad.fe", "gogo"),
     ("tankex.fe", "g 5; r; g 5; r; g 10"),
-    ("sphere.fe", "g 5; r; g 5; r; g 5"),
+    ("sphere.fe", "g 2; r; g 5; r; g 5"),
     ("qmound.fe", "gogo"),
     ("catman.fe", "r; u; g 20; hessian; hessian"),
     ("octa.fe", "g 5"),
@@ -60,8 +60,23 @@ PAPER = [
     ("PsurfaceOriented.fe", "body[1].target := 0.002; re1; re2; g 20; r; g 50"),
     ("foams/plates_64.fe", "g 30; hessian_seek; hessian_seek; hessian_seek"),
     ("foams/plates_256.fe", "g 30; hessian_seek; hessian_seek; hessian_seek"),
-    ("foams/flat2d_64.fe", "g 20; hessian_seek; hessian; hessian"),
+    ("foams/flat2d_64.fe", "M 2; g 3; hessian; hessian; hessian"),
 ]
+
+# Quadratic elements at five levels; the energy errs by the fourth power of the length of edges, so a sixteenth each time.
+QUADRATIC = (
+    "r; u; V; g 30; hessian_seek; M 2; hessian_seek; hessian; hessian; hessian; {report}"
+    + 4 * "r; hessian; hessian; hessian; {report}"
+)
+# What they converge to: by shooting for the sphere, by Surface Evolver for the torus.
+CONVERGED = [
+    ("Sphere.fe", 1.772233011001),
+    ("TorusOuter.fe", 0.0792337262),
+    ("TorusTop.fe", 0.0792683805),
+    ("TorusInner.fe", 0.0793193176),
+]
+# The relaxed foams between plates: linear as their datafiles are, and quadratic.
+PLATES = [("foams/plates_64.fe", 61.5290265), ("foams/plates_256.fe", 245.927057)]
 
 
 def examples():
@@ -108,6 +123,70 @@ def run_combwright(program, file, commands, as_printed):
         return timed([program, "evolver", "run", str(file), "-c", "quiet on", "-c", commands, "-c", REPORT, "-o", folder, *options])
 
 
+def energies(text):
+    return [float(value) for value in re.findall(r"RESULT (-?\d\S*)", text)]
+
+
+def converged(arguments, file, reference):
+    """Both programs' energies by level, and what they tend to."""
+    commands = QUADRATIC.format(report=REPORT)
+    for name, result in (
+        ("Surface Evolver", run_evolver(arguments.evolver, file, commands)),
+        ("combwright", run_combwright(arguments.combwright, file, commands, False)),
+    ):
+        found = energies(result[0])[:5]
+        if len(found) < 5:
+            print(f"{file.name:16} {name:16} {figures(result[0])[2]}", flush=True)
+            continue
+        limit = found[-1] + (found[-1] - found[-2]) / 15
+        levels = " ".join(f"{value:.12f}" for value in found[-2:])
+        print(f"{file.name:16} {name:16} {levels} limit {limit:.10f} reference {reference:.10f} "
+              f"{limit / reference - 1:+.1e}  {result[1]:.2f} s", flush=True)
+
+
+def same_mesh(arguments, file, commands):
+    """The energy at rest on one mesh: combwright's, dumped and brought to rest by both programs."""
+    rest = "hessian; hessian; hessian"
+    with tempfile.TemporaryDirectory() as folder:
+        ours = timed([arguments.combwright, "evolver", "run", str(file), "-c", "quiet on", "-c", f"{commands}; {rest}",
+                      "-c", REPORT, "-o", folder])
+        dumped = Path(folder) / "final.fe"
+        if not dumped.exists():
+            print(f"{file.name:16} {figures(ours[0])[2]}", flush=True)
+            return
+        at_once = run_evolver(arguments.evolver, dumped, "")
+        at_rest = run_evolver(arguments.evolver, dumped, "\n".join(rest.split("; ")))
+    values = [energies(text)[-1] for text, _ in (ours, at_once, at_rest) if energies(text)]
+    if len(values) == 3:
+        print(f"{file.name:16} {values[0]:.14g} at once {values[1] / values[0] - 1:+.1e} at rest {values[2] / values[0] - 1:+.1e}",
+              flush=True)
+
+
+def plates(arguments, file, reference):
+    """Surface Evolver's best script on a foam between plates, and quadratic elements here."""
+    script = (file.parent / "relax.cmd").read_text()
+    theirs = run_evolver(arguments.evolver, file, script)
+    found = re.findall(r"REP .*? en (\S+)", theirs[0])
+    ours = run_combwright(arguments.combwright, file, f"M 2; hessian_seek; hessian; hessian; {REPORT} r; hessian; hessian", False)
+    here = energies(ours[0])
+    if found and here:
+        print(f"{file.name:16} Surface Evolver {float(found[-1]):.9g} ({float(found[-1]) / reference - 1:+.1e}) {theirs[1]:.2f} s  "
+              f"combwright {here[0]:.9g}, refined {here[-1]:.9g} ({here[-1] / reference - 1:+.1e}) {ours[1]:.2f} s", flush=True)
+
+
+def compare(arguments, row, cases):
+    """Both programs on the same files with the same commands."""
+    for file, commands in cases:
+        if not file.exists() or (arguments.only and arguments.only not in file.name):
+            continue
+        result = run_evolver(arguments.evolver, file, commands)
+        answer = run_combwright(arguments.combwright, file, commands, file.name == "Psurface.fe")
+        (theirs, _, why_theirs), (ours, _, why_ours) = figures(result[0]), figures(answer[0])
+        difference = f"{abs(ours / theirs - 1):.1e}" if ours is not None and theirs else "-"
+        shown = [f"{value:.12g}" if value is not None else why for value, why in ((theirs, why_theirs), (ours, why_ours))]
+        print(row.format(file.name, *shown, difference, f"{result[1]:.2f}", f"{answer[1]:.2f}"), flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--evolver", default="evolver-nox-d")
@@ -123,15 +202,19 @@ def main():
     print(row.format("datafile", "Surface Evolver", "combwright", "relative", "s", "s"))
     if arguments.markdown:
         print("|---|---|---|---|---|---|")
-    for file, commands in cases:
-        if not file.exists() or (arguments.only and arguments.only not in file.name):
-            continue
-        result = run_evolver(arguments.evolver, file, commands)
-        answer = run_combwright(arguments.combwright, file, commands, file.name == "Psurface.fe")
-        (theirs, _, why_theirs), (ours, _, why_ours) = figures(result[0]), figures(answer[0])
-        difference = f"{abs(ours / theirs - 1):.1e}" if ours is not None and theirs else "-"
-        shown = [f"{value:.12g}" if value is not None else why for value, why in ((theirs, why_theirs), (ours, why_ours))]
-        print(row.format(file.name, *shown, difference, f"{result[1]:.2f}", f"{answer[1]:.2f}"), flush=True)
+    compare(arguments, row, cases)
+    if arguments.only or arguments.markdown:
+        return
+    print("\nconverged with quadratic elements, five levels")
+    for name, reference in CONVERGED:
+        converged(arguments, arguments.paper / name, reference)
+    print("\nat rest on one mesh, Surface Evolver relative to combwright")
+    for name in ("Sphere.fe", "TorusOuter.fe", "TorusTop.fe", "TorusInner.fe"):
+        for levels in (1, 2):
+            same_mesh(arguments, arguments.paper / name, "; ".join(["r; u; V; g 30; hessian_seek"] * levels))
+    print("\nfoams between plates")
+    for name, reference in PLATES:
+        plates(arguments, arguments.paper / name, reference)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ pub use super::function::is_zero;
 pub(crate) use super::function::{BinaryFunction, UnaryFunction};
 
 use super::{
-    expression::{BinaryOperator, Expression, Function, UnaryOperator},
+    expression::{Expression, Function, UnaryOperator},
     jet::{Jet, Scalar},
 };
 use crate::evolver::source::Position;

@@ -2,6 +2,7 @@
 //! held functionals.
 
 use super::{
+    carry::Velocity,
     freedom::{Directions, State},
     gradient::{Local, Weights},
     normals::normals,
@@ -24,6 +25,8 @@ pub(super) struct Own {
 pub(super) struct Assembled {
     pub(super) directions: IndexVec<VertexId, Own>,
     pub(super) held: Vec<FunctionalId>,
+    /// How many rows there are: directions, held functionals, and motions that are left out.
+    pub(super) size: usize,
     /// Row and column of each entry, `row ≥ column`; places may come more than once.
     pub(super) entries: Vec<(u32, u32)>,
     pub(super) values: Vec<f64>,
@@ -73,13 +76,14 @@ impl Share {
 }
 
 impl Assembled {
-    /// `normal` restricts vertices to the normals of the films.
+    /// `normal` restricts vertices to the normals of the films; steps are at right angles to the motions in `still`.
     pub(super) fn new(
         problem: &Problem,
         (surface, neighbours): (&Surface, &Neighbours),
         state: &State,
         multipliers: &IndexVec<FunctionalId, f64>,
         normal: bool,
+        still: &[Velocity],
     ) -> Self {
         let along = if normal { Some(normals(surface, neighbours)) } else { None };
         let plane = surface.dimension == 2;
@@ -97,9 +101,11 @@ impl Assembled {
             Own { first, along }
         };
         let directions: IndexVec<VertexId, Own> = problem.holds.ids().map(own).collect();
+        let held = problem.held();
         let mut assembled = Self {
             directions,
-            held: problem.held(),
+            size: freedoms + held.len() + still.len(),
+            held,
             entries: Vec::new(),
             values: Vec::new(),
             gradient: vec![0.0; freedoms],
@@ -107,8 +113,11 @@ impl Assembled {
         };
         assembled.elements(problem, state, multipliers);
         assembled.constrain(problem, state);
+        for (at, motion) in still.iter().enumerate() {
+            assembled.leave_out(assembled.size - still.len() + at, motion);
+        }
         let start = assembled.entries.len();
-        for at in 0..checked_u32(freedoms + assembled.held.len()) {
+        for at in 0..checked_u32(assembled.size) {
             assembled.push(at, at, 0.0);
         }
         assembled.diagonal = start..start + freedoms;
@@ -145,6 +154,16 @@ impl Assembled {
                 for t in 0..=s {
                     self.push(first + checked_u32(s), first + checked_u32(t), bend.col(t)[s]);
                 }
+            }
+        }
+    }
+
+    /// A row that keeps steps at right angles to a motion.
+    fn leave_out(&mut self, row: usize, motion: &Velocity) {
+        for (vertex, &velocity) in motion.enumerated() {
+            let Own { first, along } = self.directions[vertex];
+            for (s, &u) in (first..).zip(along.as_slice()) {
+                self.push(checked_u32(row), s, velocity.dot(u));
             }
         }
     }

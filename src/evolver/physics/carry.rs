@@ -2,135 +2,157 @@
 
 use super::{
     Places,
-    freedom::State,
-    gradient::Gradients,
-    problem::{FunctionalId, Problem},
+    closed::closed_volumes,
+    freedom::{Hold, State},
+    problem::{FunctionalId, Measured, Problem},
 };
 use crate::{
     evolver::{
         error::EvolverError,
-        surface::{ConstraintId, VertexId},
+        surface::{Surface, VertexId},
     },
-    index::{Id, IndexVec},
+    foam::energy::cross_matrix,
+    index::IndexVec,
 };
 use glam::{DMat3, DVec3};
 
 /// The part of a translation that walls must leave over for it to count as a direction along them.
 const ALONG: f64 = 0.25;
 
-/// A direction along the walls, and by how much the energy changes along it.
-#[derive(Clone, Debug)]
-pub(crate) struct Carrier {
-    /// The velocity of each vertex; its root mean square is 1.
-    pub(crate) velocity: IndexVec<VertexId, DVec3>,
-    /// The change of the Lagrangian for a unit of way, at most zero.
-    pub(crate) slope: f64,
-}
+/// The velocity of each vertex.
+pub(crate) type Velocity = IndexVec<VertexId, DVec3>;
 
 impl Problem {
-    /// The translation along the walls that lowers the Lagrangian most. `None` where something holds the surface: a fixed
-    /// vertex, a boundary, walls on all sides, or no wall at all, which leaves nothing to gain.
+    /// What the energy would be more if the bodies closed on their walls had the volumes that their integrals give, to first
+    /// order. Integrals along chords of a contact line depend on where their gauge vanishes, and would draw the surface away
+    /// from there.
+    pub(crate) fn discrepancy(
+        &self,
+        surface: &Surface,
+        places: &Places,
+        multipliers: &IndexVec<FunctionalId, f64>,
+    ) -> f64 {
+        let values = self.values(places);
+        let closed = closed_volumes(self, surface, places);
+        self.functionals
+            .enumerated()
+            .filter(|(_, functional)| functional.target.is_some())
+            .map(|(id, functional)| {
+                let Measured::Volume(body) = functional.measured else { return 0.0 };
+                closed[body].map_or(0.0, |closed| multipliers[id] * (values.functionals[id] - closed))
+            })
+            .sum()
+    }
+
+    /// Motions along the walls as nearly rigid as they allow, of root mean square 1. None where something holds the
+    /// surface (a fixed vertex, a boundary, walls on all sides), and none without walls, where nothing is to gain.
     ///
     /// # Errors
     /// [`EvolverError::Numerical`] if a vertex lies where its wall has no normal.
-    pub(crate) fn carrier(
-        &self,
-        state: &State,
-        multipliers: &IndexVec<FunctionalId, f64>,
-    ) -> Result<Option<Carrier>, EvolverError> {
-        let walls = self.touched_walls();
-        if walls.is_empty() || self.holds_something() {
-            return Ok(None);
+    pub(crate) fn carriers(&self, state: &State) -> Result<Vec<Velocity>, EvolverError> {
+        let walls = self.holds.iter().any(|hold| !hold.constraints().is_empty());
+        let held = self.holds.iter().any(|hold| matches!(hold, Hold::Fixed(_) | Hold::Boundary(_)));
+        if !walls || held {
+            return Ok(Vec::new());
         }
-        let tangents = self.tangents(state, &walls);
-        if !tangents.iter().all(|tangent| tangent.is_finite()) {
+        let turns = self.rigid(state);
+        if !turns.iter().all(|turn| turn.is_finite()) {
             let message = "a vertex lies where its wall has no normal; the surface cannot be slid".to_owned();
             return Err(EvolverError::Numerical(message));
         }
-        let gradients = self.gradients(&state.places, self.slots());
-        let forces = self.lagrangian_gradient(&gradients, multipliers);
-        // For the translation t the velocities are Tᵢ t with projections Tᵢ: slope Σ Tᵢ gᵢ, mean square t·(Σ Tᵢ / n) t.
-        let (mut slope, mut mean) = (DVec3::ZERO, DMat3::ZERO);
-        for (tangent, force) in tangents.iter().zip(forces.iter()) {
-            slope += *tangent * *force;
-            mean += *tangent;
-        }
-        #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
-        let mean = mean * (1.0 / tangents.len() as f64);
-        let Some(translation) = steepest(mean, slope) else { return Ok(None) };
-        let velocity = tangents.iter().map(|tangent| *tangent * translation).collect();
-        Ok(Some(Carrier { velocity, slope: slope.dot(translation) }))
-    }
-
-    /// The constraints that vertices lie on.
-    fn touched_walls(&self) -> Vec<ConstraintId> {
-        let mut walls: Vec<ConstraintId> =
-            self.holds.iter().flat_map(|hold| hold.constraints().iter().copied()).collect();
-        walls.sort_unstable_by_key(|id| id.index());
-        walls.dedup();
-        walls
-    }
-
-    fn holds_something(&self) -> bool {
-        use super::freedom::Hold;
-        self.holds.iter().any(|hold| matches!(hold, Hold::Fixed(_) | Hold::Boundary(_)))
-    }
-
-    /// The projections onto the directions along the walls: those of a vertex's own, elsewhere along all that are touched,
-    /// by the mean of their normals.
-    fn tangents(&self, state: &State, walls: &[ConstraintId]) -> IndexVec<VertexId, DMat3> {
-        let along_all = |place: DVec3| {
-            let mut sum = DVec3::ZERO;
-            for &wall in walls {
-                let normal = self.walls[wall].formula.jet(place).gradient.normalize();
-                sum += if sum.dot(normal) < 0.0 { -normal } else { normal };
-            }
-            let normal = sum.normalize();
-            DMat3::IDENTITY - DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z)
+        let mean = |walls: bool| {
+            let chosen = |vertex: &VertexId| !walls || !self.holds[*vertex].constraints().is_empty();
+            let squares =
+                turns.enumerated().filter(|(vertex, _)| chosen(vertex)).map(|(_, v)| v.transpose() * *v);
+            let (sum, count) =
+                squares.fold((DMat3::ZERO, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+            sum * (1.0 / count)
         };
-        self.holds
-            .enumerated()
-            .map(|(vertex, hold)| {
-                if hold.constraints().is_empty() {
-                    return along_all(state.places[vertex]);
-                }
-                let axes = DVec3::AXES.map(|axis| self.projected(state, vertex, axis));
-                DMat3::from_cols(axes[0], axes[1], axes[2])
-            })
-            .collect()
+        let (on_walls, everywhere) = (mean(true), mean(false));
+        let field = |translation: DVec3| {
+            let size = translation.dot(everywhere * translation).sqrt();
+            turns.iter().map(|turn| *turn * translation / size).collect()
+        };
+        Ok(left_over(on_walls).into_iter().map(field).collect())
     }
 
-    /// The gradient of the Lagrangian with these multipliers; the energy's has couplings in it.
-    fn lagrangian_gradient(
+    /// The change of the Lagrangian, with the [discrepancy](Self::discrepancy), along a velocity; `step` is that of the
+    /// discrepancy's differences.
+    pub(crate) fn slope(
         &self,
-        gradients: &Gradients,
+        surface: &Surface,
+        state: &State,
         multipliers: &IndexVec<FunctionalId, f64>,
-    ) -> Places {
-        self.holds
+        velocity: &Velocity,
+        step: f64,
+    ) -> f64 {
+        let gradients = self.gradients(&state.places, self.slots());
+        let work: f64 = self
+            .holds
             .ids()
             .map(|vertex| {
                 let held: DVec3 =
                     gradients.functionals.at(vertex).map(|(id, gradient)| multipliers[id] * gradient).sum();
-                gradients.energy[vertex] - held
+                (gradients.energy[vertex] - held).dot(velocity[vertex])
+            })
+            .sum();
+        let moved = |way: f64| {
+            let mut moved = state.clone();
+            for (vertex, &velocity) in velocity.enumerated() {
+                self.push(&mut moved, vertex, velocity, way);
+                self.settle(&mut moved, vertex, false);
+            }
+            self.discrepancy(surface, &moved.places, multipliers)
+        };
+        work + (moved(step) - moved(-step)) / (2.0 * step)
+    }
+
+    /// The velocity of each vertex for a unit translation of the whole: the translation with that turn about the middle which
+    /// leaves the least motion against the walls, less what motion is left.
+    fn rigid(&self, state: &State) -> IndexVec<VertexId, DMat3> {
+        #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
+        let count = state.places.len().max(1) as f64;
+        let middle = state.places.iter().sum::<DVec3>() / count;
+        let along: IndexVec<VertexId, DMat3> = self
+            .holds
+            .ids()
+            .map(|vertex| {
+                let axes = DVec3::AXES.map(|axis| self.projected(state, vertex, axis));
+                DMat3::from_cols(axes[0], axes[1], axes[2])
+            })
+            .collect();
+        // t − Rω with R the matrix of the arm has the part N(t − Rω) against the walls: (Σ RᵀNR) ω = Σ RᵀN t.
+        let (mut matrix, mut sides) = (DMat3::ZERO, DMat3::ZERO);
+        for (vertex, along) in along.enumerated() {
+            let arm = cross_matrix(state.places[vertex] - middle);
+            let against = arm.transpose() * (DMat3::IDENTITY - *along);
+            matrix += against * arm;
+            sides += against;
+        }
+        let size = matrix.col(0).x + matrix.col(1).y + matrix.col(2).z;
+        let turn = (matrix + DMat3::from_diagonal(DVec3::splat(UNTURNED * size))).inverse() * sides;
+        let turn = if turn.is_finite() { turn } else { DMat3::ZERO };
+        along
+            .enumerated()
+            .map(|(vertex, along)| {
+                *along * (DMat3::IDENTITY - cross_matrix(state.places[vertex] - middle) * turn)
             })
             .collect()
     }
 }
 
-/// The translation `t` with `t·Mt = 1` of the steepest descent, among the directions that the walls leave over.
-fn steepest(mean: DMat3, slope: DVec3) -> Option<DVec3> {
+/// Turns that cost less than this part of the others, as about the normal of round walls, are left out.
+const UNTURNED: f64 = 1e-6;
+
+/// The directions of translation that walls leave over, by the mean squares of the velocities on them.
+fn left_over(mean: DMat3) -> Vec<DVec3> {
     let matrix = faer::Mat::from_fn(3, 3, |i, j| mean.col(j)[i]);
-    let eigen = matrix.self_adjoint_eigen(faer::Side::Lower).ok()?;
+    let Ok(eigen) = matrix.self_adjoint_eigen(faer::Side::Lower) else { return Vec::new() };
     let (vectors, values) = (eigen.U(), eigen.S().column_vector());
-    let mut translation = DVec3::ZERO;
-    for k in 0..3 {
-        if values[k] > ALONG {
-            let direction = DVec3::new(vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]);
-            translation -= slope.dot(direction) / values[k] * direction;
-        }
-    }
-    let size = translation.dot(mean * translation).sqrt();
-    (size > 0.0).then(|| translation / size)
+    (0..3)
+        .filter(|&k| values[k] > ALONG)
+        .map(|k| DVec3::new(vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]))
+        .collect()
 }
 
 #[cfg(test)]
@@ -138,11 +160,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_steepest_translation_leaves_out_what_walls_forbid() {
-        // Walls across z; the slope is steepest there, and down along −x.
-        let mean = DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.01));
-        let found = steepest(mean, DVec3::new(2.0, 0.0, 9.0)).unwrap();
-        assert!((found - DVec3::NEG_X).length() < 1e-14, "{found}");
-        assert!(steepest(DMat3::ZERO, DVec3::X).is_none());
+    fn directions_that_walls_forbid_are_left_out() {
+        // Walls across z.
+        let found = left_over(DMat3::from_diagonal(DVec3::new(1.0, 0.9, 0.01)));
+        assert_eq!(found.len(), 2);
+        assert!(found.iter().all(|t| t.z.abs() < 1e-14 && (t.length() - 1.0).abs() < 1e-14), "{found:?}");
+        assert!(left_over(DMat3::ZERO).is_empty());
     }
 }

@@ -31,7 +31,7 @@ impl Newton {
         for _ in 0..ITERATIONS {
             for vector in &mut basis {
                 let mut rhs = vector.clone();
-                rhs.resize(self.freedoms + self.held.len(), 0.0);
+                rhs.resize(self.size, 0.0);
                 *vector = factor.solve(&rhs).map_err(failed)?;
                 vector.truncate(self.freedoms);
             }
@@ -65,7 +65,7 @@ impl Newton {
             .iter()
             .map(|vector| {
                 let mut padded = vector.clone();
-                padded.resize(self.freedoms + self.held.len(), 0.0);
+                padded.resize(self.size, 0.0);
                 let zero = vec![0.0; padded.len()];
                 let mut image: Vec<f64> = plain.residual(&zero, &padded).iter().map(|x| -x).collect();
                 image.truncate(self.freedoms);

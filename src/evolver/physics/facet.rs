@@ -140,12 +140,12 @@ fn add_flat_area(factor: f64, nodes: [DVec3; 3], gradient: &mut [DVec3], hessian
     let Some(hessian) = hessian else { return };
     let flat = (half / length) * (DMat3::IDENTITY - outer(unit, unit));
     // By corner, ∂n/∂xᵢ = [sᵢ]ₓ up to sign; the product of two sides bends n itself between different corners.
-    let turns = sides.map(|side| cross_matrix(side));
+    let turns = sides.map(cross_matrix);
     let bend = half * cross_matrix(unit);
     for i in 0..3 {
         let left = turns[i].transpose() * flat;
-        for j in 0..3 {
-            let both = left * turns[j];
+        for (j, turn) in turns.iter().enumerate() {
+            let both = left * *turn;
             hessian.add(
                 i,
                 j,

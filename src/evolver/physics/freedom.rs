@@ -4,10 +4,7 @@ use super::{Places, problem::Problem};
 use crate::{
     evolver::{
         datafile::Side,
-        surface::{
-            BoundaryId, ConstraintId, Directed, Neighbours, Surface, VertexId, Wall, multipliers, one_sided,
-            return_to,
-        },
+        surface::{BoundaryId, ConstraintId, Surface, VertexId, Wall, multipliers, return_to},
     },
     index::{Id, IndexVec},
 };

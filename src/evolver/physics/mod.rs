@@ -17,7 +17,7 @@
 //! | volumes closed on the walls themselves, by the foam's kernels | `closed.rs` |
 
 mod assemble;
-mod carry;
+pub(crate) mod carry;
 pub(crate) mod closed;
 pub(crate) mod descend;
 mod edge;

@@ -6,6 +6,7 @@
 
 use super::{
     assemble::{Assembled, Own},
+    carry::Velocity,
     descend::Restoring,
     freedom::State,
     problem::{FunctionalId, Problem, Values},
@@ -32,6 +33,8 @@ pub(crate) struct Newton {
     gradient: Vec<f64>,
     /// How many unknowns are directions.
     pub(super) freedoms: usize,
+    /// How many unknowns there are.
+    pub(super) size: usize,
     /// The entries of the diagonal of the directions.
     diagonal: std::ops::Range<usize>,
 }
@@ -53,25 +56,26 @@ pub(super) fn failed(error: crate::foam::solve::FactorError) -> EvolverError {
 
 impl Newton {
     /// Assembles the matrix. `normal` restricts vertices to the normals of the films; `pattern` keeps the order in which the
-    /// matrix is factored for the next one with the same entries.
+    /// matrix is factored for the next one with the same entries; steps leave out the motions in `still`.
     pub(crate) fn new(
         problem: &Problem,
         (surface, neighbours): (&Surface, &Neighbours),
         state: &State,
         multipliers: &IndexVec<FunctionalId, f64>,
         normal: bool,
+        still: &[Velocity],
         pattern: &mut Option<Arc<SymmetricPattern>>,
     ) -> Result<Self, EvolverError> {
-        let Assembled { directions, held, entries, values, gradient, diagonal } =
-            Assembled::new(problem, (surface, neighbours), state, multipliers, normal);
-        let (freedoms, size) = (gradient.len(), gradient.len() + held.len());
+        let Assembled { directions, held, size, entries, values, gradient, diagonal } =
+            Assembled::new(problem, (surface, neighbours), state, multipliers, normal, still);
+        let freedoms = gradient.len();
         let known = pattern.take().filter(|known| known.fits(size, &entries));
         let order = match known {
             Some(known) => known,
             None => Arc::new(SymmetricPattern::new(size, entries).map_err(failed)?),
         };
         *pattern = Some(Arc::clone(&order));
-        Ok(Self { pattern: order, values, directions, held, gradient, freedoms, diagonal })
+        Ok(Self { pattern: order, values, directions, held, gradient, freedoms, size, diagonal })
     }
 
     /// Factors the matrix less `shift` times the identity on the directions.
@@ -88,7 +92,7 @@ impl Newton {
 
     /// How many eigenvalues of the Hessian on the constraints lie below `value`.
     pub(crate) fn below(&self, value: f64) -> Result<usize, EvolverError> {
-        Ok(self.factor(value)?.negative.saturating_sub(self.held.len()))
+        Ok(self.factor(value)?.negative.saturating_sub(self.size - self.freedoms))
     }
 
     /// The step to the stationary point of the quadratic model.
@@ -99,6 +103,7 @@ impl Newton {
             let target = problem.functionals()[id].target.unwrap_or(0.0);
             values.functionals[id] - target
         }));
+        rhs.resize(self.size, 0.0);
         let solution = factor.solve(&rhs).map_err(failed)?;
         if !solution.iter().all(|x| x.is_finite()) {
             return Err(EvolverError::Numerical("the Hessian is singular; take g steps first".to_owned()));
@@ -110,7 +115,7 @@ impl Newton {
         Ok(NewtonStep {
             velocity: self.velocity(&solution),
             multipliers,
-            unstable: factor.negative.saturating_sub(self.held.len()),
+            unstable: factor.negative.saturating_sub(self.size - self.freedoms),
         })
     }
 

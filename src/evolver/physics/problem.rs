@@ -191,6 +191,18 @@ impl Problem {
         &self.functionals
     }
 
+    /// In a torus volumes are known up to whole tori only: takes off so many of them that held volumes come nearest to their
+    /// targets.
+    pub(crate) fn take_off_tori(&mut self, torus: f64, values: &Values) {
+        for (id, functional) in self.functionals.as_mut_slice().iter_mut().enumerate() {
+            let (Some(target), Measured::Volume(_)) = (functional.target, functional.measured) else {
+                continue;
+            };
+            let over = (values.functionals[FunctionalId::from_index(id)] - target) / torus;
+            functional.constant -= torus * over.round();
+        }
+    }
+
     /// Those that are held.
     pub(crate) fn held(&self) -> Vec<FunctionalId> {
         self.functionals.enumerated().filter(|(_, f)| f.target.is_some()).map(|(id, _)| id).collect()

@@ -2,23 +2,17 @@
 
 use super::{
     Host, Session,
-    evaluate::{Element, Scope},
+    evaluate::Scope,
     format::{Argument, printf, significant},
 };
-use crate::{
-    evolver::{
-        command::{Action, Assignment, Simple, Statement},
-        datafile::Purpose,
-        error::EvolverError,
-        language::{
-            expression::{ElementKind, Expression, Query},
-            formula::is_zero,
-        },
-        physics::FunctionalId,
-        source::{Position, Source},
-        surface::{BodyId, EdgeId, FacetId, VertexId},
+use crate::evolver::{
+    command::{Action, Simple, Statement},
+    error::EvolverError,
+    language::{
+        expression::{Expression, Query},
+        formula::is_zero,
     },
-    index::Id,
+    source::{Position, Source},
 };
 use std::sync::Arc;
 

@@ -218,7 +218,7 @@ impl Session {
                 quantities: &self.quantities,
                 relative: self.by_quantities,
             };
-            let problem = Problem::new(&self.data, &self.surface, &conditions)?;
+            let mut problem = Problem::new(&self.data, &self.surface, &conditions)?;
             let mut state = State::new(&self.surface);
             problem.follow_boundaries(&self.surface, &mut state);
             if let Err(vertex) = problem.settle_all(&mut state, false) {
@@ -227,7 +227,11 @@ impl Session {
                 return Err(EvolverError::Surface(message));
             }
             state.store(&mut self.surface);
-            let values = problem.values(&state.places);
+            let mut values = problem.values(&state.places);
+            if let Some(torus) = self.surface.torus_volume() {
+                problem.take_off_tori(torus, &values);
+                values = problem.values(&state.places);
+            }
             self.problem = Some(Current { problem, state, values, inputs });
         }
         match &mut self.problem {

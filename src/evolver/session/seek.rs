@@ -5,15 +5,15 @@ use crate::{
     evolver::{
         error::EvolverError,
         language::formula::is_zero,
-        physics::{FunctionalId, Values, freedom::State, newton::Newton},
+        physics::{FunctionalId, Values, carry::Velocity, freedom::State, newton::Newton},
     },
     index::{Id, IndexVec},
 };
 use std::fmt::Write as _;
 
 impl Session {
-    /// The matrix of a Newton step here.
-    pub(super) fn newton(&mut self) -> Result<(Newton, Values, State), EvolverError> {
+    /// The matrix of a Newton step here, which leaves out the motions in `still`.
+    pub(super) fn newton(&mut self, still: &[Velocity]) -> Result<(Newton, Values, State), EvolverError> {
         self.current()?;
         if self.needs_quantities() {
             self.convert_to_quantities();
@@ -31,6 +31,7 @@ impl Session {
             &current.state,
             &self.multipliers,
             self.normal,
+            still,
             &mut self.pattern,
         )?;
         Ok((newton, current.values.clone(), current.state.clone()))
@@ -38,7 +39,7 @@ impl Session {
 
     /// `hessian`: a full Newton step, undone where it would destroy the surface.
     pub(super) fn hessian(&mut self, host: &mut dyn Host) -> Done {
-        let (newton, values, old) = self.newton()?;
+        let (newton, values, old) = self.newton(&[])?;
         let residual = newton.residual();
         let Some(current) = &mut self.problem else { return Ok(()) };
         let step = newton.step(&current.problem, &values)?;
@@ -92,7 +93,8 @@ impl Session {
         let around = self.neighbours();
         let Some(current) = &self.problem else { return Ok(None) };
         let films = (&self.surface, &*around);
-        let there = Newton::new(&current.problem, films, moved, multipliers, self.normal, &mut self.pattern)?;
+        let there =
+            Newton::new(&current.problem, films, moved, multipliers, self.normal, &[], &mut self.pattern)?;
         if there.residual() < residual {
             return Ok(None);
         }
@@ -129,7 +131,7 @@ impl Session {
 
     /// `hessian_seek`: the best place along the Newton direction.
     pub(super) fn hessian_seek(&mut self, most: f64, host: &mut dyn Host) -> Done {
-        let (newton, values, old) = self.newton()?;
+        let (newton, values, old) = self.newton(&[])?;
         let Some(current) = &self.problem else { return Ok(()) };
         let step = newton.step(&current.problem, &values)?;
         let (_, base) = current.problem.stepped(&old, &step.velocity, 0.0)?;
@@ -152,7 +154,7 @@ impl Session {
 
     /// `saddle`: down the most unstable direction.
     pub(super) fn saddle(&mut self, most: f64, host: &mut dyn Host) -> Done {
-        let (newton, _, old) = self.newton()?;
+        let (newton, _, old) = self.newton(&[])?;
         let (values, direction) = newton.eigenvalues(lowest_guess(&newton)?, 1)?;
         let lowest = values.first().copied().unwrap_or(0.0);
         self.eigenvalue = lowest;
@@ -185,14 +187,14 @@ impl Session {
     }
 
     pub(super) fn eigenprobe(&mut self, value: f64, host: &mut dyn Host) -> Done {
-        let (newton, ..) = self.newton()?;
+        let (newton, ..) = self.newton(&[])?;
         let below = newton.below(value)?;
         host.print(&format!("Eigencounts below {}: {below}\n", significant(value, 8)));
         Ok(())
     }
 
     pub(super) fn ritz(&mut self, shift: f64, count: usize, host: &mut dyn Host) -> Done {
-        let (newton, ..) = self.newton()?;
+        let (newton, ..) = self.newton(&[])?;
         let (values, _) = newton.eigenvalues(shift, count)?;
         let mut text = String::new();
         for (at, value) in values.iter().enumerate() {

@@ -207,6 +207,14 @@ impl Surface {
         }
     }
 
+    /// The volume of the torus, if there is one; its area in the plane.
+    pub(crate) fn torus_volume(&self) -> Option<f64> {
+        self.periods.map(|periods| match self.dimension {
+            2 => periods.x_axis.cross(periods.y_axis).length(),
+            _ => periods.determinant().abs(),
+        })
+    }
+
     /// The vertex that a directed edge starts from.
     #[must_use]
     pub fn tail(&self, directed: Directed) -> VertexId {
