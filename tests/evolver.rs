@@ -1,6 +1,10 @@
 //! Surface Evolver datafiles: the language, its errors, and runs held against laws and against Surface Evolver's own numbers.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may fail by a panic, too")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests may fail by a panic, and say what they skip"
+)]
 
 use combwright::evolver::{
     Document, EvolverError, parse_commands,
@@ -221,7 +225,7 @@ fn shared(name: &str) -> Option<String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/fe").join(name);
     let text = std::fs::read_to_string(&path).ok();
     if text.is_none() {
-        eprintln!("skipped: {} is not here", path.display());
+        println!("skipped: {} is not here", path.display());
     }
     text
 }

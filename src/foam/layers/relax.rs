@@ -123,7 +123,8 @@ pub fn relaxed(
         let goes_on = !asked_to_stop && steps < settings.step_limit;
         let flipped = goes_on && !shrinking.sides.is_empty() && run.flip(&shrinking);
         let spread = goes_on && !flipped && stuck && run.spread();
-        if !flipped && !spread && !(goes_on && !stuck && run.refine()) {
+        let refined = !flipped && !spread && goes_on && !stuck && run.refine();
+        if !(flipped || spread || refined) {
             let descended = Descended { steps, ..descended };
             return Ok(run.end(&descent, descended, first_energy));
         }

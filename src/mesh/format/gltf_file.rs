@@ -40,8 +40,8 @@ impl GltfFile {
     /// An empty file that will hold about `size` bytes of data.
     #[must_use]
     pub fn with_capacity(size: usize) -> Self {
-        let mut root = Root::default();
-        root.asset = Asset { generator: Some("combwright".to_owned()), ..Asset::default() };
+        let asset = Asset { generator: Some("combwright".to_owned()), ..Asset::default() };
+        let root = Root { asset, ..Root::default() };
         Self { root, bytes: Vec::with_capacity(size), buffer: Index::new(0) }
     }
 
