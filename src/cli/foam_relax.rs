@@ -93,11 +93,13 @@ pub(super) fn run(
     let job = Job::new(settings, start.seeds.psi6);
     let mut keeper = Keeper::new(&job, bar, Some(folder.target().join(CHECKPOINT)), Vec::new());
     let relaxed = keeper.relax(Begin::Network(network), gap)?;
+    let until_relaxed = began.elapsed().as_secs_f64();
     let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, bar)?;
     let made = Made::new(&job, gap, relaxed, keeper.record)?.finished(&job, settings, gap, annealing)?;
     let seconds = vec![
         ("seeds and partition", until_partition),
-        ("relaxation", began.elapsed().as_secs_f64() - until_partition),
+        ("relaxation", until_relaxed - until_partition),
+        ("annealing and figures", began.elapsed().as_secs_f64() - until_relaxed),
     ];
     write_all(&mut folder, &job, settings, gap, &made, Some(&start.seeds), seconds)?;
     bar.finish_and_clear();
