@@ -96,7 +96,8 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     // The same number of elements on each half side; the default is the coarsest.
     let fineness = if fine { settings.relax.strips.along } else { 1 };
     let tolerance = settings.relax.tolerance.max(1e-10);
-    let how = LayerSettings { fineness, tolerance, ..LayerSettings::new(sheets.spacing) };
+    let changes_topology = arrangement == Arrangement::Annealed;
+    let how = LayerSettings { fineness, tolerance, changes_topology, ..LayerSettings::new(sheets.spacing) };
     let layers = relaxed(division, &gap, &how, &mut |told| {
         bar.set_message(format!("force {:.1e}", told.residuals.force));
         interrupt::flow()
@@ -182,9 +183,10 @@ fn ended(layers: &Layers) -> String {
             format!("step limit of {} reached, {vanishing} borders vanishing", descended.steps)
         }
         Ending::Stalled => format!("stalled after {} steps, {vanishing} borders vanishing", descended.steps),
-        Ending::Halted => {
-            format!("stopped after {} steps, {vanishing} borders vanishing", descended.steps)
-        }
+        Ending::Halted => format!(
+            "stopped after {} steps: {vanishing} borders vanish, where the foam would change its topology",
+            descended.steps
+        ),
     }
 }
 

@@ -56,13 +56,16 @@ pub struct LayerSettings {
     pub tolerance: f64,
     /// The most Newton steps in all.
     pub step_limit: usize,
+    /// Whether vanishing borders change the topology; otherwise the foam ends where they vanish, so that an arrangement stays
+    /// what it is.
+    pub changes_topology: bool,
 }
 
 impl LayerSettings {
     /// The coarsest films, to a force of 1e-10.
     #[must_use]
     pub fn new(spacing: f64) -> Self {
-        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600 }
+        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600, changes_topology: true }
     }
 }
 
@@ -121,9 +124,10 @@ pub fn relaxed(
         let asked_to_stop =
             descended.ending == Ending::Halted && shrinking.sides.is_empty() && !shrinking.stuck;
         let goes_on = !asked_to_stop && steps < settings.step_limit;
-        let flipped = goes_on && !shrinking.sides.is_empty() && run.flip(&shrinking);
+        let vanish = !shrinking.sides.is_empty();
+        let flipped = goes_on && vanish && settings.changes_topology && run.flip(&shrinking);
         let spread = goes_on && !flipped && stuck && run.spread();
-        let refined = !flipped && !spread && goes_on && !stuck && run.refine();
+        let refined = goes_on && !flipped && !spread && !stuck && run.refine();
         if !(flipped || spread || refined) {
             let descended = Descended { steps, ..descended };
             return Ok(run.end(&descent, descended, first_energy));
@@ -211,6 +215,10 @@ impl Run<'_> {
         let (limit, small) =
             (factor * VANISHING * self.settings.spacing, factor * SMALL_FILM * self.settings.spacing);
         let short = |side: &Side, length: f64| length < limit && (held_up || length < before[side]);
+        if !self.settings.changes_topology {
+            let sides = now.iter().filter(|&(side, &length)| short(side, length)).map(|(&side, _)| side);
+            return Vanishing { sides: sides.collect(), small, stuck: false };
+        }
         let exhausted = self.flips >= MOST_FLIPS * self.division.seeds.len();
         if exhausted || !now.iter().any(|(side, &length)| short(side, length)) {
             return Vanishing::default();
