@@ -122,7 +122,7 @@ impl Surface {
     /// The two films at an edge with the smallest angle between them.
     fn closest_pair(&self, edge: Directed, around: &Neighbours) -> Option<Pair> {
         let films: Vec<(FacetId, DVec3)> =
-            around.facets[edge.edge].iter().map(|&(facet, at)| (facet, self.into_facet(facet, at))).collect();
+            around.facets[edge.edge].iter().map(|&(facet, at)| (facet, self.inward(facet, at))).collect();
         let mut best: Option<(f64, Pair)> = None;
         for (at, (one, a)) in films.iter().enumerate() {
             for (other, b) in &films[at + 1..] {
@@ -137,7 +137,7 @@ impl Surface {
     }
 
     /// The unit vector from an edge into a facet.
-    fn into_facet(&self, facet: FacetId, at: usize) -> DVec3 {
+    fn inward(&self, facet: FacetId, at: usize) -> DVec3 {
         let edges = &self.facets[facet].edges;
         self.area_vector(facet).cross(self.side(edges[at])).normalize_or_zero()
     }
@@ -174,7 +174,7 @@ impl Surface {
     fn film_between(&self, edge: Directed, [first, second]: Pair) -> Facet {
         let sides = |facet: FacetId| -> [Option<BodyId>; 2] {
             let data = &self.facets[facet];
-            let same = data.edges.iter().any(|&directed| directed == edge);
+            let same = data.edges.contains(&edge);
             if same { data.bodies } else { [data.bodies[1], data.bodies[0]] }
         };
         self.free_facet(first, [sides(first)[0], sides(second)[1]])
@@ -193,7 +193,7 @@ impl Surface {
     fn shift(&self, edges: [Directed; 2], sheets: &[Vec<FacetId>; 2], around: &Neighbours) -> DVec3 {
         let at_edge = |edge: EdgeId, facet: Option<&FacetId>| {
             let found = around.facets[edge].iter().find(|(id, _)| Some(id) == facet);
-            found.map_or(DVec3::ZERO, |&(facet, at)| self.into_facet(facet, at))
+            found.map_or(DVec3::ZERO, |&(facet, at)| self.inward(facet, at))
         };
         let way: DVec3 = sheets
             .iter()
