@@ -173,8 +173,7 @@ fn fuzz(seconds: u64) {
                 .collect::<Vec<_>>()
                 .join(" "),
             _ => {
-                let mut bytes =
-                    format!("{CUBE}read\n{MUTATED}").into_bytes();
+                let mut bytes = format!("{CUBE}read\n{MUTATED}").into_bytes();
                 for _ in 0..random.random_range(1..8) {
                     let at = random.random_range(0..bytes.len());
                     bytes[at] = b" 0123456789-+.*/()[]{};:=\nabcdefgvx"[random.random_range(0..36)];
