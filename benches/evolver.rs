@@ -155,6 +155,9 @@ procedure pp(integer nn) { print ff(nn); for ( ii := 1; ii < nn; ii++ ) { zz[ii]
 pp(3); delete edge[5]; o; pop vertex; refine edge where length > 0.4; t 0.2
 ";
 
+/// What mutations put in.
+const LETTERS: &[u8] = b" 0123456789-+.*/()[]{};:=,\nabcdefgvx";
+
 /// Random bytes, random words, and mutations of a sound file; a session runs what can be read.
 fn fuzz(seconds: u64) {
     let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -176,7 +179,7 @@ fn fuzz(seconds: u64) {
                 let mut bytes = format!("{CUBE}read\n{MUTATED}").into_bytes();
                 for _ in 0..random.random_range(1..8) {
                     let at = random.random_range(0..bytes.len());
-                    bytes[at] = b" 0123456789-+.*/()[]{};:=\nabcdefgvx"[random.random_range(0..36)];
+                    bytes[at] = LETTERS[random.random_range(0..LETTERS.len())];
                 }
                 String::from_utf8_lossy(&bytes).into_owned()
             }

@@ -63,7 +63,7 @@ struct RunArguments {
     /// Run the file as it is printed, wrong faces and all
     #[arg(long, conflicts_with = "fix")]
     as_printed: bool,
-    /// Stop after so many commands
+    /// Stop after so many commands and steps of g
     #[arg(long, value_name = "COUNT", default_value_t = COMMAND_BUDGET)]
     max_commands: u64,
 }
