@@ -18,7 +18,9 @@ pub(crate) struct Evidence {
     pub(crate) radii: [f64; RAYS],
     /// Share of rays that end within the photograph, or meet the wall before they leave it.
     pub(crate) visible: f64,
-    /// Share of those rays that meet a wall.
+    /// Share of all rays along which the cell reaches to the photograph's border.
+    pub(crate) at_border: f64,
+    /// Share of the rays that are visible that meet a wall.
     pub(crate) closure: f64,
     /// Mean rise of the levelled relief from the inside to the wall.
     pub(crate) rise: f64,
@@ -61,7 +63,7 @@ pub(crate) fn gather(
 fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch: f64) -> Evidence {
     let mut radii = [0.0; RAYS];
     let mut rims = Vec::with_capacity(RAYS);
-    let (mut closed, mut rise, mut contrast) = (0.0, 0.0, 0.0);
+    let (mut closed, mut rise, mut contrast, mut at_border) = (0.0, 0.0, 0.0, 0.0);
     let window = WALL_WINDOW * pitch;
     let middle_raw = middle(rasters.wallness, centre, pitch);
     for (ray, reached) in radii.iter_mut().enumerate() {
@@ -70,8 +72,11 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
         let highest = |plane: &Plane| highest(plane, centre, step, radius - window, radius + window);
         *reached = radius;
         let height = highest(rasters.relief) - inside;
-        if !rasters.segmentation.holds(centre + step * (radius + 1.0)) && height < WALL_RISE {
-            continue;
+        if !rasters.segmentation.holds(centre + step * (radius + 1.0)) {
+            at_border += 1.0;
+            if height < WALL_RISE {
+                continue;
+            }
         }
         rise += height;
         contrast += highest(rasters.wallness) - middle_raw;
@@ -85,6 +90,7 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
     Evidence {
         radii,
         visible: rims.len() as f64 / RAYS as f64,
+        at_border: at_border / RAYS as f64,
         closure: closed,
         rise,
         contrast,

@@ -121,6 +121,37 @@ impl OutputFolder {
         &self.names
     }
 
+    /// Saves the target's own file of this name if it is another than the one that will replace it, so that what a person
+    /// wrote into it is not lost; the name of the copy.
+    ///
+    /// # Errors
+    /// [`OutputError`] if it cannot be read or copied.
+    pub fn keep_other(&self, name: &str) -> Result<Option<String>, OutputError> {
+        let there = self.target.join(name);
+        if !there.is_file() {
+            return Ok(None);
+        }
+        let read = |path: &Path| fs::read(path).map_err(|e| OutputError::new("read", path, e));
+        let old = read(&there)?;
+        if old == read(&self.staging.path().join(name))? {
+            return Ok(None);
+        }
+        let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+        let mut number = 1;
+        loop {
+            let copy = format!("{stem}.before-{number}.{extension}");
+            let path = self.target.join(&copy);
+            if !path.exists() {
+                write_whole(&path, |file| io::Write::write_all(file, &old))?;
+                return Ok(Some(copy));
+            }
+            if read(&path)? == old {
+                return Ok(Some(copy));
+            }
+            number += 1;
+        }
+    }
+
     /// Where the files will be.
     #[must_use]
     pub fn target(&self) -> &Path {
