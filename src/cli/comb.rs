@@ -127,6 +127,7 @@ struct Run<'a> {
     mask: Option<&'a Path>,
     scale_mm_per_px: Option<f64>,
     corrections: Option<&'a Corrections>,
+    cells_crc32: u32,
     seconds: f64,
 }
 
@@ -242,16 +243,21 @@ fn read_one(
         mask: arguments.mask.as_deref(),
         scale_mm_per_px: summary.mm_per_px,
         corrections: corrections.is_some().then_some(&settings.corrections),
+        cells_crc32: folder.checksum(output::CELLS)?,
         seconds: start.elapsed().as_secs_f64(),
     };
     folder.write_json("run.json", &run)?;
-    if let Some(copy) = folder.keep_other(output::CELLS)? {
-        bar.suspend(|| {
-            eprintln!("note: the folder's {} was another one; it is kept as {copy}", output::CELLS)
-        });
+    if let Some(copy) = folder.keep_other(output::CELLS, written_before(&target))? {
+        bar.suspend(|| eprintln!("note: the folder's {} was edited; it is kept as {copy}", output::CELLS));
     }
     folder.commit()?;
     Ok(summary)
+}
+
+/// The checksum of the table that the last run into a folder has written.
+fn written_before(folder: &Path) -> Option<u32> {
+    let run: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("run.json")).ok()?).ok()?;
+    run["cells_crc32"].as_u64().and_then(|sum| u32::try_from(sum).ok())
 }
 
 fn applied(kept: &Path, corrections: &Corrections) -> String {

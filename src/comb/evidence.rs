@@ -8,6 +8,8 @@ use rayon::prelude::*;
 pub(crate) const RAYS: usize = 36;
 /// A ray's wall is looked for this far before and behind the region's edge, in pitches.
 const WALL_WINDOW: f64 = 0.1;
+/// A wall that is highest this near to the photograph's border, in pixels of the raster, may be higher beyond it.
+const LAST_PIXELS: f64 = 1.0;
 /// A ray meets a wall if the relief rises by at least this from the cell's inside; a typical wall rises by 1.5 to 2.
 const WALL_RISE: f64 = 0.55;
 
@@ -18,7 +20,7 @@ pub(crate) struct Evidence {
     pub(crate) radii: [f64; RAYS],
     /// Share of rays that end within the photograph, or meet the wall before they leave it.
     pub(crate) visible: f64,
-    /// Share of all rays along which the cell reaches to the photograph's border.
+    /// Share of all rays along which the wall is highest at the photograph's border, so that only its inner half can be seen.
     pub(crate) at_border: f64,
     /// Share of the rays that are visible that meet a wall.
     pub(crate) closure: f64,
@@ -73,7 +75,7 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
         *reached = radius;
         let height = highest(rasters.relief) - inside;
         if !rasters.segmentation.holds(centre + step * (radius + 1.0)) {
-            at_border += 1.0;
+            at_border += f64::from(u8::from(rises_to(rasters.relief, centre, step, radius, pitch)));
             if height < WALL_RISE {
                 continue;
             }
@@ -136,6 +138,12 @@ fn highest(plane: &Plane, centre: DVec2, step: DVec2, from: f64, to: f64) -> f64
         radius += 0.75;
     }
     best
+}
+
+/// Whether the relief is highest, in the outer half of a ray, within the last pixels.
+fn rises_to(plane: &Plane, centre: DVec2, step: DVec2, radius: f64, pitch: f64) -> bool {
+    let end = radius - LAST_PIXELS;
+    highest(plane, centre, step, end, radius) > highest(plane, centre, step, 0.25 * pitch, end)
 }
 
 /// Where the relief last rises above `level` on the way out: the rim of the opening.

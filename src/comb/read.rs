@@ -45,8 +45,8 @@ const CORNER_AREA: f64 = 0.45;
 const CORNER_TOTAL: RangeInclusive<f64> = 0.8..=1.4;
 const CORNER_RISE: f64 = 0.8;
 
-/// A cell is cut if more than this share of its outline lies on the photograph's border, where only the inner half of a wall can
-/// be seen: two thirds of a side.
+/// A cell is cut if along more than this share of its outline, two thirds of a side, only the inner half of its wall lies in the
+/// photograph.
 const AT_BORDER: f64 = 0.11;
 /// A cell that the border cuts is a sliver if less than this share of its outline is seen.
 const HALF_SEEN: f64 = 0.5;

@@ -17,7 +17,7 @@ use std::ops::Range;
 /// Radius of a marker, in pitches: inside any cell, and wide enough to cover a glint at its centre.
 const MARKER_RADIUS: f64 = 0.16;
 /// Radius of a marker that a person has set: most of a cell, whatever fills it.
-const MARKER_BY_HAND: f64 = 0.34;
+const MARKER_BY_HAND: f64 = 0.4;
 /// A cell ends this far from its marker, in pitches: corners of a regular cell are at 0.58.
 pub(crate) const REACH: f64 = 0.95;
 /// Longest edge of a tile in pixels, without its margin: such a tile stays in a processor's cache.

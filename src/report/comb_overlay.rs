@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use resvg::tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, PixmapMut, Stroke, Transform};
 
 /// Pixels per cell in the overlay: a larger photograph is reduced to it, so that the file stays small enough to be opened.
-const OVERLAY_PITCH: f64 = 96.0;
+const OVERLAY_PITCH: f64 = 64.0;
 /// Rows that are drawn as one task.
 const BAND: usize = 256;
 /// Height of a legend of one row, and what each further one adds.
