@@ -41,8 +41,7 @@ fn foam() -> Tried<(State, CellPattern)> {
     settings.anneal.sweeps = 200;
     settings.polish.steps = 40;
     let begun = start(&gap, &domain, &settings, &mut |_| ControlFlow::Continue(()))?;
-    let network = begun.network.ok_or("no network")?;
-    let relaxed = relax(network, &gap, &RelaxSettings::default(), &mut |_| ControlFlow::Continue(()))?;
+    let relaxed = relax(begun.network, &gap, &RelaxSettings::default(), &mut |_| ControlFlow::Continue(()))?;
     assert!(matches!(relaxed.stop, Stop::Converged { .. }), "{:?}", relaxed.stop);
     let pattern =
         pattern_of_state(&relaxed.state, &gap, PatternPlace::Middle).map_err(|d| format!("{d:?}"))?;
