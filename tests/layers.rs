@@ -34,7 +34,7 @@ fn made(
     let sheets = sheets(space, &gap, arrangement, cells, 1, &mut |_| ControlFlow::Continue(()))?;
     let domain = space.domain().unwrap();
     let division = Division::new(&gap, &domain, &sheets.seeds, sheets.lower, sheets.spacing)?;
-    let settings = LayerSettings { fineness, ..LayerSettings::new(sheets.spacing) };
+    let settings = LayerSettings { fineness, ..LayerSettings::new(arrangement, sheets.spacing) };
     relaxed(division, &gap, &settings, &mut |_: &DescentStep<'_>| ControlFlow::Continue(()))
 }
 
@@ -112,6 +112,16 @@ fn layers_annealed_for_themselves_come_to_balance() -> Result<(), NoLayers> {
     // Both named arrangements are foams of the same cells; annealed ones may lie above them, but not far.
     let best = flat(Arrangement::Toth, 1)?.energy;
     assert!((best * 0.9999..best * 1.02).contains(&layers.energy), "{} {best}", layers.energy);
+    Ok(())
+}
+
+#[test]
+fn bees_ends_on_almost_regular_hexagons_end_where_borders_vanish() -> Result<(), NoLayers> {
+    // Corners where eight borders meet part into short borders, on which films cannot come to rest.
+    let space = FoamSpace::Plane { periods: [4.0, 4.62], height: HEIGHT };
+    let layers = made(&space, Arrangement::Rhombic, CELLS, 1)?;
+    assert_eq!(layers.descended.ending, Ending::Halted, "{:?}", layers.descended);
+    assert!(!layers.vanishing.is_empty() && layers.flips == 0);
     Ok(())
 }
 

@@ -96,8 +96,7 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     // The same number of elements on each half side; the default is the coarsest.
     let fineness = if fine { settings.relax.strips.along } else { 1 };
     let tolerance = settings.relax.tolerance.max(1e-10);
-    let changes_topology = arrangement == Arrangement::Annealed;
-    let how = LayerSettings { fineness, tolerance, changes_topology, ..LayerSettings::new(sheets.spacing) };
+    let how = LayerSettings { fineness, tolerance, ..LayerSettings::new(arrangement, sheets.spacing) };
     let layers = relaxed(division, &gap, &how, &mut |told| {
         bar.set_message(format!("force {:.1e}", told.residuals.force));
         interrupt::flow()

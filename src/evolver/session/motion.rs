@@ -67,7 +67,8 @@ impl Session {
             }
             Simple::Volumes => self.volumes(host)?,
             Simple::Counts => self.counts(host),
-            Simple::PopEdges | Simple::PopNonminimal => return self.pop(host),
+            Simple::PopNonminimal => return self.pop(true, scope, host),
+            Simple::PopEdges => return self.pop(false, scope, host),
             Simple::ConjugateGradient(on) => {
                 self.descent.conjugate = on.unwrap_or(!self.descent.conjugate);
                 self.descent.restart();
