@@ -92,12 +92,11 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         sheets(&settings.space, &gap, arrangement, cells, settings.seeds.seed, &mut |_| interrupt::flow());
     let sheets = sheets.map_err(failed)?;
     let division =
-        Division::new(&gap, &domain, &sheets.seeds, sheets.lower, sheets.spacing).map_err(failed)?;
+        Division::new(&gap, &domain, &sheets).map_err(failed)?;
     // The same number of elements on each half side; the default is the coarsest.
     let fineness = if fine { settings.relax.strips.along } else { 1 };
     let tolerance = settings.relax.tolerance.max(1e-10);
-    let changes_topology = arrangement == Arrangement::Annealed;
-    let how = LayerSettings { fineness, tolerance, changes_topology, ..LayerSettings::new(sheets.spacing) };
+    let how = LayerSettings { fineness, tolerance, ..LayerSettings::new(arrangement, sheets.spacing) };
     let layers = relaxed(division, &gap, &how, &mut |told| {
         bar.set_message(format!("force {:.1e}", told.residuals.force));
         interrupt::flow()

@@ -1,11 +1,11 @@
-//! The Voronoi cells of two sheets of seeds, cut off by the walls: cells, films as polygons, corners.
+//! The power cells of two sheets of weighted seeds, cut off by the walls: cells, films as polygons, corners.
 //!
 //! Each cell is a convex polyhedron, cut from a cube by the half spaces towards its neighbours. What the walls leave of it
 //! is decided corner by corner: corners inside the gap stay, an edge that leaves the gap ends where it meets the wall, and a
 //! film that is cut off ends in an edge on the wall. Corners of neighbouring cells that coincide become one, so that
 //! arrangements of high symmetry, where more than four cells meet, come out right.
 
-use super::NoLayers;
+use super::{NoLayers, Sheets};
 use crate::foam::partition::polyhedron::{Behind, Face, HalfSpace, Polyhedron};
 use crate::{
     foam::{
@@ -81,24 +81,18 @@ struct Cut {
 }
 
 impl Division {
-    /// Divides the gap between `seeds`, the first `lower` of which belong to the lower layer. `spacing` is about the
-    /// distance of neighbouring seeds.
+    /// Divides the gap between the seeds of `sheets`.
     ///
     /// # Errors
     /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
-    pub fn new(
-        gap: &Gap,
-        domain: &Domain,
-        seeds: &[DVec3],
-        lower: usize,
-        spacing: f64,
-    ) -> Result<Self, NoLayers> {
-        let seeds: Vec<DVec3> = seeds.iter().map(|&seed| domain.wrap(seed).0).collect();
-        let bins = Bins::new(domain, spacing, &seeds);
-        let cells: Vec<Vec<Cut>> = (0..seeds.len())
+    pub fn new(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
+        let Sheets { lower, spacing, .. } = *sheets;
+        let seeded = Seeded::new(domain, sheets);
+        let cells: Vec<Vec<Cut>> = (0..seeded.seeds.len())
             .into_par_iter()
-            .map(|cell| cut_cell(gap, &bins, &seeds, cell, spacing))
+            .map(|cell| cut_cell(gap, &seeded, cell))
             .collect::<Result<_, _>>()?;
+        let seeds = seeded.seeds;
         let mut division =
             Self { seeds, lower, period: domain.period(), corners: Vec::new(), polygons: Vec::new() };
         let mut joiner = Joiner::new(domain.period(), JOINED * spacing);
@@ -181,47 +175,95 @@ impl Division {
     }
 }
 
-fn cut_cell(
-    gap: &Gap,
-    bins: &Bins,
-    seeds: &[DVec3],
-    cell: usize,
-    spacing: f64,
-) -> Result<Vec<Cut>, NoLayers> {
-    let seed = seeds[cell];
-    let mut near: Vec<(f64, usize, Image, DVec3)> = Vec::new();
-    bins.for_each_near(seed, REACH * spacing, |other, image, place| {
-        if other != cell || image != Image::IDENTITY {
-            near.push((place.distance_squared(seed), other, image, place - seed));
-        }
-    });
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
-    let mut body = Polyhedron::cube(CUBE * spacing);
-    for (at, &(square, ..)) in near.iter().enumerate() {
-        if square > 4.0 * body.radius_squared() {
-            break;
-        }
-        let way = near[at].3;
-        let half_space = HalfSpace {
-            normal: way.normalize_or_zero(),
-            offset: 0.5 * square.sqrt(),
-            behind: Behind::Cell(checked_u32(at)),
-        };
-        // A cut that only grazes corners takes nothing away.
-        let slack = HalfSpace { offset: half_space.offset + 1e-12 * spacing, ..half_space };
-        body.cut(slack).map_err(|_| NoLayers::Seeds { place: seed })?;
-    }
-    let faces = body.faces.iter().filter_map(|face| {
+fn cut_cell(gap: &Gap, seeded: &Seeded, cell: usize) -> Result<Vec<Cut>, NoLayers> {
+    let seed = seeded.seeds[cell];
+    let Body { polyhedron, near } = seeded.body(cell)?;
+    let faces = polyhedron.faces.iter().filter_map(|face| {
         let Behind::Cell(at) = face.half_space.behind else { return None };
-        let (_, neighbour, image, _) = near[at as usize];
-        let corners = within_walls(gap, &body, face, seed);
+        let Near { cell: neighbour, image, .. } = near[at as usize];
+        let kept = within_walls(gap, &polyhedron, face, seed);
+        let corners: Vec<_> = kept.into_iter().map(|kept| (seed + kept.place, kept.wall)).collect();
         (corners.len() > 2).then(|| Cut { neighbour, shift: image.shift(), corners })
     });
     Ok(faces.collect())
 }
 
+/// Seeds with their weights, inside the primary box.
+pub(super) struct Seeded {
+    pub(super) seeds: Vec<DVec3>,
+    weights: Vec<f64>,
+    heaviest: f64,
+    spacing: f64,
+    bins: Bins,
+}
+
+/// A seed near another.
+pub(super) struct Near {
+    pub(super) cell: usize,
+    pub(super) image: Image,
+    /// The way to it.
+    pub(super) way: DVec3,
+}
+
+/// A cell round its seed as the origin, before the walls cut it off; and the seeds that its faces are numbered by.
+pub(super) struct Body {
+    pub(super) polyhedron: Polyhedron,
+    pub(super) near: Vec<Near>,
+}
+
+impl Seeded {
+    pub(super) fn new(domain: &Domain, sheets: &Sheets) -> Self {
+        let seeds: Vec<DVec3> = sheets.seeds.iter().map(|&seed| domain.wrap(seed).0).collect();
+        let bins = Bins::new(domain, sheets.spacing, &seeds);
+        let heaviest = sheets.weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self { seeds, weights: sheets.weights.clone(), heaviest, spacing: sheets.spacing, bins }
+    }
+
+    pub(super) fn body(&self, cell: usize) -> Result<Body, NoLayers> {
+        let (seed, spacing) = (self.seeds[cell], self.spacing);
+        let mut near: Vec<Near> = Vec::new();
+        self.bins.for_each_near(seed, REACH * spacing, |other, image, place| {
+            if other != cell || image != Image::IDENTITY {
+                near.push(Near { cell: other, image, way: place - seed });
+            }
+        });
+        let key = |near: &Near| (near.cell, near.image);
+        near.sort_by(|a, b| {
+            a.way.length_squared().total_cmp(&b.way.length_squared()).then(key(a).cmp(&key(b)))
+        });
+        let own = self.weights[cell];
+        let mut polyhedron = Polyhedron::cube(CUBE * spacing);
+        for (at, Near { cell: other, way, .. }) in near.iter().enumerate() {
+            let distance = way.length();
+            // The heaviest seed at this distance has its plane at (d² + w − W) / 2d.
+            let radius = polyhedron.radius_squared();
+            if distance > radius.sqrt() + (radius + self.heaviest - own).sqrt() {
+                break;
+            }
+            let square = way.length_squared() + own - self.weights[*other];
+            // A cut that only grazes corners takes nothing away.
+            let half_space = HalfSpace {
+                normal: way.normalize_or_zero(),
+                offset: 0.5 * square / distance + 1e-12 * spacing,
+                behind: Behind::Cell(checked_u32(at)),
+            };
+            polyhedron.cut(half_space).map_err(|_| NoLayers::Seeds { place: seed })?;
+        }
+        Ok(Body { polyhedron, near })
+    }
+}
+
+/// A corner of what the walls leave of a face, seen from the seed.
+pub(super) struct Kept {
+    pub(super) place: DVec3,
+    /// The wall that it lies on.
+    pub(super) wall: Option<WallSide>,
+    /// The ends of the polyhedron's edge that it lies on; twice the same for a corner of the polyhedron.
+    pub(super) edge: [u32; 2],
+}
+
 /// The part of a face inside the gap: corners that stay, and the places where its edges meet the walls.
-fn within_walls(gap: &Gap, body: &Polyhedron, face: &Face, seed: DVec3) -> Vec<(DVec3, Option<WallSide>)> {
+pub(super) fn within_walls(gap: &Gap, body: &Polyhedron, face: &Face, seed: DVec3) -> Vec<Kept> {
     let mut kept = Vec::with_capacity(face.corners.len() + 2);
     let outside = |p: DVec3| match (gap.wall(WallSide::Lower).value(p), gap.wall(WallSide::Upper).value(p)) {
         (below, _) if below < 0.0 => Some(WallSide::Lower),
@@ -230,16 +272,17 @@ fn within_walls(gap: &Gap, body: &Polyhedron, face: &Face, seed: DVec3) -> Vec<(
     };
     let count = face.corners.len();
     for at in 0..count {
-        let place = |at: usize| seed + body.corners[face.corners[at % count] as usize];
-        let (from, to) = (place(at), place(at + 1));
+        let edge = [face.corners[at], face.corners[(at + 1) % count]];
+        let [from, to] = edge.map(|corner| seed + body.corners[corner as usize]);
         let (leaves, enters) = (outside(from), outside(to));
         if leaves.is_none() {
-            kept.push((from, None));
+            kept.push(Kept { place: from - seed, wall: None, edge: [edge[0]; 2] });
         }
         for side in [leaves, enters].into_iter().flatten() {
             if leaves != enters {
                 let wall = gap.wall(side);
-                kept.push((wall.field.crossing(from, to, wall.level), Some(side)));
+                let place = wall.field.crossing(from, to, wall.level) - seed;
+                kept.push(Kept { place, wall: Some(side), edge });
             }
         }
     }

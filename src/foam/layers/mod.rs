@@ -6,10 +6,11 @@
 //! | step | file |
 //! |---|---|
 //! | two sheets of seeds: rhombic, Tóth's, or annealed on both sides | `arrangement.rs` |
-//! | their Voronoi cells, cut off by the walls; corners, polygons | `division.rs` |
+//! | annealed sheets settle together: plane films between power cells, of least area at equal volumes | `settle.rs`, `plane_films.rs` |
+//! | their power cells, cut off by the walls; corners, polygons | `division.rs` |
 //! | the film complex: each polygon as curved quadrilaterals round its middle | `films.rs` |
 //! | the descent to least energy at equal volumes | `relax.rs` |
-//! | borders and films that vanish: changes of topology | `flip.rs` |
+//! | borders and films that vanish: changes of topology | `flip/` |
 //! | ends with plane films: energies by formula | `ends.rs` |
 //! | side counts; angles at corners | `figures.rs` |
 //! | how the defects of the two layers sit to each other | `companions.rs` |
@@ -28,7 +29,9 @@ mod ends;
 mod figures;
 mod films;
 mod flip;
+mod plane_films;
 mod relax;
+mod settle;
 
 pub use arrangement::{Arrangement, Sheets, sheets};
 pub use companions::{Chance, Charged, Companions, Compared, charged, companions};

@@ -1,7 +1,7 @@
 //! The descent of a two-layer foam, with changes of topology where a border vanishes on the way.
 
 use super::{
-    Division, LayerFilms, NoLayers,
+    Arrangement, Division, LayerFilms, NoLayers,
     films::{Side, films_after, films_refined},
     flip::{Cluster, Moves},
     layer_films,
@@ -62,16 +62,21 @@ pub struct LayerSettings {
 }
 
 impl LayerSettings {
-    /// The coarsest films, to a force of 1e-10.
+    /// The coarsest films, to a force of 1e-10; only annealed layers, which are no arrangement that has a name, change their
+    /// topology.
     #[must_use]
-    pub fn new(spacing: f64) -> Self {
-        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600, changes_topology: true }
+    pub fn new(arrangement: Arrangement, spacing: f64) -> Self {
+        let changes_topology = arrangement == Arrangement::Annealed;
+        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600, changes_topology }
     }
 }
 
 /// Borders below this part of the spacing that go on shrinking change the topology. Beyond it borders that would stay are
 /// flipped, below it elements beside them become slivers first.
 const VANISHING: f64 = 0.05;
+/// A given arrangement ends where a border is below this part of the spacing, shrinking or not: its Newton steps are then held
+/// up by slivers. It lies far below the shortest borders of arrangements that settle.
+const VANISHED: f64 = 0.004;
 /// A triangle beside such a border becomes a border if all its sides are below this part: longer ones first shrink.
 const SMALL_FILM: f64 = 0.15;
 /// Steps of which less than this part could be taken are held up by slivers: then sides of triple that length go, shrinking or
@@ -85,7 +90,7 @@ const MOST_SPREADS: usize = 12;
 const WEARINESS: f64 = 0.6;
 
 /// The coarsest films.
-const FIRST_FINENESS: usize = 1;
+const FIRST_FINENESS: usize = 0;
 /// The force at which the first descent, on the coarsest films, ends: topology has settled by then.
 const FIRST_TOLERANCE: f64 = 1e-3;
 
@@ -127,7 +132,7 @@ pub fn relaxed(
         let vanish = !shrinking.sides.is_empty();
         let flipped = goes_on && vanish && settings.changes_topology && run.flip(&shrinking);
         let spread = goes_on && !flipped && stuck && run.spread();
-        let refined = goes_on && !flipped && !spread && !stuck && run.refine();
+        let refined = goes_on && !flipped && !spread && run.refine();
         if !(flipped || spread || refined) {
             let descended = Descended { steps, ..descended };
             return Ok(run.end(&descent, descended, first_energy));
@@ -214,11 +219,12 @@ impl Run<'_> {
         let factor = if held_up { HELD_UP_BY } else { 1.0 };
         let (limit, small) =
             (factor * VANISHING * self.settings.spacing, factor * SMALL_FILM * self.settings.spacing);
-        let short = |side: &Side, length: f64| length < limit && (held_up || length < before[side]);
         if !self.settings.changes_topology {
-            let sides = now.iter().filter(|&(side, &length)| short(side, length)).map(|(&side, _)| side);
-            return Vanishing { sides: sides.collect(), small, stuck: false };
+            let gone = |side: &&Side| now[*side] < VANISHED * self.settings.spacing;
+            let sides = self.films.borders.keys().filter(gone).copied().collect();
+            return Vanishing { sides, small, stuck: false };
         }
+        let short = |side: &Side, length: f64| length < limit && (held_up || length < before[side]);
         let exhausted = self.flips >= MOST_FLIPS * self.division.seeds.len();
         if exhausted || !now.iter().any(|(side, &length)| short(side, length)) {
             return Vanishing::default();
