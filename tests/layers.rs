@@ -137,4 +137,10 @@ fn layers_that_do_not_fit_are_refused() {
     assert!(matches!(sown(space(), Arrangement::Toth, 14), Err(NoLayers::Rows { .. })));
     let sphere = FoamSpace::Sphere { radii: [1.0, 1.5] };
     assert!(matches!(sown(sphere, Arrangement::Toth, 16), Err(NoLayers::Curved { .. })));
+    // Cells a third as high as wide, and more cells than memory holds.
+    let Err(NoLayers::Flat { flattest, needed }) = sown(sphere, Arrangement::Annealed, 16) else {
+        panic!("flat layers are refused");
+    };
+    assert!((0.1..0.5).contains(&flattest) && needed > 64.0, "{flattest} {needed}");
+    assert!(matches!(sown(space(), Arrangement::Annealed, 4000), Err(NoLayers::Many { .. })));
 }

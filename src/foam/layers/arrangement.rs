@@ -49,8 +49,17 @@ pub struct Sheets {
     pub lower: usize,
     /// The distance of neighbours in a layer, as of a hexagonal lattice.
     pub spacing: f64,
-    /// The volume that a cell shall have.
-    pub cell_volume: f64,
+    /// The volume that each cell of the lower and of the upper layer shall have: together the layers fill the gap up to its
+    /// middle surface.
+    pub volumes: [f64; 2],
+}
+
+impl Sheets {
+    /// The same sheets with their seeds inside the primary box.
+    pub(super) fn wrapped(&self, domain: &Domain) -> Self {
+        let seeds = self.seeds.iter().map(|&seed| domain.wrap(seed).0).collect();
+        Self { seeds, weights: self.weights.clone(), ..*self }
+    }
 }
 
 /// Rows may be stretched by this part against those of regular hexagons.
@@ -127,7 +136,7 @@ fn rows(arrangement: Arrangement, periods: [f64; 2], height: f64, cells: usize) 
         seeds,
         lower: cells,
         spacing: spacing(area, cells),
-        cell_volume: area * height / as_f64(2 * cells),
+        volumes: [area * height / as_f64(2 * cells); 2],
     })
 }
 
@@ -142,6 +151,14 @@ const FILLED: f64 = 0.65;
 /// The part of the least radius of curvature within which seeds stay: normals cross beyond it.
 const WITHIN: f64 = 0.8;
 
+/// Cells less high than this part of their spacing are refused: the films between the layers, which slope as much as cells
+/// are wide, lower their area by reaching the walls.
+const FLATTEST: f64 = 0.5;
+/// The height, in spacings, from which on layers keep apart on all surfaces that were tried.
+const COMFORTABLE: f64 = 0.7;
+/// The most cells on each wall: the factors of Newton's matrix then take 2 GB, and each of some hundred steps a minute.
+const MOST_CELLS: usize = 1000;
+
 /// How much farther seeds are put where the cells of the nearest ones reach the other wall.
 const FARTHER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 
@@ -150,9 +167,18 @@ const FARTHER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> Result<Sheets, NoLayers> {
     let middle = gap.middle().as_ref();
     let domain = Domain::of_surface(middle);
+    let middle_samples = SurfaceSamples::new(middle, 0.0, AREA_LINES);
+    let spacing = spacing(middle_samples.area(), cells);
+    if cells > MOST_CELLS {
+        return Err(NoLayers::Many {
+            cells,
+            most: MOST_CELLS,
+            width: spacing * (as_f64(cells) / as_f64(MOST_CELLS)).sqrt(),
+        });
+    }
+    let [below, above] = gap.halves().map(|half| gap_volume(&half, &domain) / as_f64(cells));
+    refuse_flat(gap, &middle_samples, [below, above], cells)?;
     let settings = SeedSettings::new(cells, seed);
-    let cell_volume = gap_volume(gap, &domain) / as_f64(2 * cells);
-    let spacing = spacing(SurfaceSamples::new(middle, 0.0, AREA_LINES).area(), cells);
     let mut places = Vec::with_capacity(2 * cells);
     for layer in 0..2 {
         let sown = sow(gap, &domain, &settings, layer, &mut |share| {
@@ -169,7 +195,7 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
             Ok(place + side * away.min(WITHIN / bend) * middle.normal(place))
         });
         let seeds: Vec<DVec3> = seeds.collect::<Result<_, NoLayers>>()?;
-        Ok(Sheets { weights: vec![0.0; seeds.len()], seeds, lower: cells, spacing, cell_volume })
+        Ok(Sheets { weights: vec![0.0; seeds.len()], seeds, lower: cells, spacing, volumes: [below, above] })
     };
     let fits = |sheets: &Sheets| Division::new(gap, &domain, sheets).is_ok();
     for farther in FARTHER {
@@ -179,6 +205,22 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
         }
     }
     settled(gap, &domain, moved(FARTHER[0])?, progress)
+}
+
+/// Refuses layers that are so flat that films between the layers would reach the walls.
+fn refuse_flat(gap: &Gap, middle: &SurfaceSamples, volumes: [f64; 2], cells: usize) -> Result<(), NoLayers> {
+    for (wall, volume) in gap.walls().iter().zip(volumes) {
+        // A cell's height, to first order in the gap, over the spacing of neighbours of its volume.
+        let height = |place: DVec3| wall.level.abs() / wall.field.gradient(place).length();
+        let flat = |place: DVec3| height(place).powi(3).sqrt() / (volume * 2.0 / 3.0_f64.sqrt()).sqrt();
+        let flattest = middle.points().iter().map(|point| flat(point.position)).fold(f64::INFINITY, f64::min);
+        if flattest < FLATTEST {
+            // The spacing falls with the root of the number of cells.
+            let needed = (COMFORTABLE / flattest).powi(2) * as_f64(cells);
+            return Err(NoLayers::Flat { flattest, needed });
+        }
+    }
+    Ok(())
 }
 
 /// How far from the middle surface a seed is put.

@@ -58,6 +58,8 @@ pub struct Division {
     pub seeds: Vec<DVec3>,
     /// How many of them belong to the lower layer.
     pub lower: usize,
+    /// The volume that each cell of the lower and of the upper layer shall have.
+    pub volumes: [f64; 2],
     /// The lattice.
     pub period: Period,
     /// All corners.
@@ -86,15 +88,15 @@ impl Division {
     /// # Errors
     /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
     pub fn new(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
-        let Sheets { lower, spacing, .. } = *sheets;
-        let seeded = Seeded::new(domain, sheets);
-        let cells: Vec<Vec<Cut>> = (0..seeded.seeds.len())
+        let sheets = sheets.wrapped(domain);
+        let neighbours = Neighbours::new(domain, &sheets);
+        let cells: Vec<Vec<Cut>> = (0..sheets.seeds.len())
             .into_par_iter()
-            .map(|cell| cut_cell(gap, &seeded, cell))
+            .map(|cell| cut_cell(gap, &neighbours, &sheets, cell))
             .collect::<Result<_, _>>()?;
-        let seeds = seeded.seeds;
-        let mut division =
-            Self { seeds, lower, period: domain.period(), corners: Vec::new(), polygons: Vec::new() };
+        let Sheets { seeds, lower, spacing, volumes, .. } = sheets;
+        let period = domain.period();
+        let mut division = Self { seeds, lower, volumes, period, corners: Vec::new(), polygons: Vec::new() };
         let mut joiner = Joiner::new(domain.period(), JOINED * spacing);
         for (cell, cuts) in cells.into_iter().enumerate() {
             for cut in cuts {
@@ -175,32 +177,30 @@ impl Division {
     }
 }
 
-fn cut_cell(gap: &Gap, seeded: &Seeded, cell: usize) -> Result<Vec<Cut>, NoLayers> {
-    let seed = seeded.seeds[cell];
-    let Body { polyhedron, near } = seeded.body(cell)?;
+fn cut_cell(gap: &Gap, neighbours: &Neighbours, sheets: &Sheets, cell: usize) -> Result<Vec<Cut>, NoLayers> {
+    let seed = sheets.seeds[cell];
+    let Body { polyhedron, near } = neighbours.body(sheets, cell)?;
+    let outside = outside(gap, &polyhedron, seed);
     let faces = polyhedron.faces.iter().filter_map(|face| {
         let Behind::Cell(at) = face.half_space.behind else { return None };
-        let Near { cell: neighbour, image, .. } = near[at as usize];
-        let kept = within_walls(gap, &polyhedron, face, seed);
+        let Near { cell: neighbour, shift, .. } = near[at as usize];
+        let kept = within_walls(gap, &polyhedron, face, &outside, seed);
         let corners: Vec<_> = kept.into_iter().map(|kept| (seed + kept.place, kept.wall)).collect();
-        (corners.len() > 2).then(|| Cut { neighbour, shift: image.shift(), corners })
+        (corners.len() > 2).then_some(Cut { neighbour, shift, corners })
     });
     Ok(faces.collect())
 }
 
-/// Seeds with their weights, inside the primary box.
-pub(super) struct Seeded {
-    pub(super) seeds: Vec<DVec3>,
-    weights: Vec<f64>,
-    heaviest: f64,
-    spacing: f64,
-    bins: Bins,
+/// Who may touch whom: for each seed, the seeds near it and their images in periods.
+pub(super) struct Neighbours {
+    near: Vec<Vec<(usize, IVec3)>>,
+    period: Period,
 }
 
 /// A seed near another.
 pub(super) struct Near {
     pub(super) cell: usize,
-    pub(super) image: Image,
+    pub(super) shift: IVec3,
     /// The way to it.
     pub(super) way: DVec3,
 }
@@ -211,43 +211,50 @@ pub(super) struct Body {
     pub(super) near: Vec<Near>,
 }
 
-impl Seeded {
+impl Neighbours {
+    /// Of seeds inside the primary box, the nearest first.
     pub(super) fn new(domain: &Domain, sheets: &Sheets) -> Self {
-        let seeds: Vec<DVec3> = sheets.seeds.iter().map(|&seed| domain.wrap(seed).0).collect();
-        let bins = Bins::new(domain, sheets.spacing, &seeds);
-        let heaviest = sheets.weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Self { seeds, weights: sheets.weights.clone(), heaviest, spacing: sheets.spacing, bins }
+        let Sheets { seeds, spacing, .. } = sheets;
+        let bins = Bins::new(domain, *spacing, seeds);
+        let near = seeds.par_iter().enumerate().map(|(cell, &seed)| {
+            let mut near = Vec::new();
+            bins.for_each_near(seed, REACH * spacing, |other, image, place| {
+                if other != cell || image != Image::IDENTITY {
+                    near.push((place.distance_squared(seed), other, image.shift()));
+                }
+            });
+            let key = |&(_, other, shift): &(f64, usize, IVec3)| (other, shift.to_array());
+            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(key(a).cmp(&key(b))));
+            near.into_iter().map(|(_, other, shift)| (other, shift)).collect()
+        });
+        Self { near: near.collect(), period: domain.period() }
     }
 
-    pub(super) fn body(&self, cell: usize) -> Result<Body, NoLayers> {
-        let (seed, spacing) = (self.seeds[cell], self.spacing);
-        let mut near: Vec<Near> = Vec::new();
-        self.bins.for_each_near(seed, REACH * spacing, |other, image, place| {
-            if other != cell || image != Image::IDENTITY {
-                near.push(Near { cell: other, image, way: place - seed });
-            }
+    /// The cell of a seed; the seeds may have moved since the neighbours were listed.
+    ///
+    /// # Errors
+    /// [`NoLayers::Seeds`] if nothing is left of it.
+    pub(super) fn body(&self, sheets: &Sheets, cell: usize) -> Result<Body, NoLayers> {
+        let (seed, own, spacing) = (sheets.seeds[cell], sheets.weights[cell], sheets.spacing);
+        let near = self.near[cell].iter().map(|&(other, shift)| {
+            let way = sheets.seeds[other] + self.period.translation(shift) - seed;
+            Near { cell: other, shift, way }
         });
-        let key = |near: &Near| (near.cell, near.image);
-        near.sort_by(|a, b| {
-            a.way.length_squared().total_cmp(&b.way.length_squared()).then(key(a).cmp(&key(b)))
-        });
-        let own = self.weights[cell];
+        let near: Vec<Near> = near.collect();
         let mut polyhedron = Polyhedron::cube(CUBE * spacing);
         for (at, Near { cell: other, way, .. }) in near.iter().enumerate() {
             let distance = way.length();
-            // The heaviest seed at this distance has its plane at (d² + w − W) / 2d.
-            let radius = polyhedron.radius_squared();
-            if distance > radius.sqrt() + (radius + self.heaviest - own).sqrt() {
-                break;
-            }
-            let square = way.length_squared() + own - self.weights[*other];
+            let square = way.length_squared() + own - sheets.weights[*other];
             // A cut that only grazes corners takes nothing away.
             let half_space = HalfSpace {
                 normal: way.normalize_or_zero(),
                 offset: 0.5 * square / distance + 1e-12 * spacing,
                 behind: Behind::Cell(checked_u32(at)),
             };
-            polyhedron.cut(half_space).map_err(|_| NoLayers::Seeds { place: seed })?;
+            if half_space.offset * half_space.offset < polyhedron.radius_squared() || half_space.offset < 0.0
+            {
+                polyhedron.cut(half_space).map_err(|_| NoLayers::Seeds { place: seed })?;
+            }
         }
         Ok(Body { polyhedron, near })
     }
@@ -262,19 +269,35 @@ pub(super) struct Kept {
     pub(super) edge: [u32; 2],
 }
 
-/// The part of a face inside the gap: corners that stay, and the places where its edges meet the walls.
-pub(super) fn within_walls(gap: &Gap, body: &Polyhedron, face: &Face, seed: DVec3) -> Vec<Kept> {
-    let mut kept = Vec::with_capacity(face.corners.len() + 2);
-    let outside = |p: DVec3| match (gap.wall(WallSide::Lower).value(p), gap.wall(WallSide::Upper).value(p)) {
-        (below, _) if below < 0.0 => Some(WallSide::Lower),
-        (_, above) if above > 0.0 => Some(WallSide::Upper),
-        _ => None,
+/// The wall beyond which each corner of a body lies; none inside the gap.
+pub(super) fn outside(gap: &Gap, body: &Polyhedron, seed: DVec3) -> Vec<Option<WallSide>> {
+    let beyond = |&corner: &DVec3| {
+        let value = |side| gap.wall(side).value(seed + corner);
+        if value(WallSide::Lower) < 0.0 {
+            Some(WallSide::Lower)
+        } else if value(WallSide::Upper) > 0.0 {
+            Some(WallSide::Upper)
+        } else {
+            None
+        }
     };
+    body.corners.iter().map(beyond).collect()
+}
+
+/// The part of a face inside the gap: corners that stay, and the places where its edges meet the walls.
+pub(super) fn within_walls(
+    gap: &Gap,
+    body: &Polyhedron,
+    face: &Face,
+    outside: &[Option<WallSide>],
+    seed: DVec3,
+) -> Vec<Kept> {
+    let mut kept = Vec::with_capacity(face.corners.len() + 2);
     let count = face.corners.len();
     for at in 0..count {
         let edge = [face.corners[at], face.corners[(at + 1) % count]];
         let [from, to] = edge.map(|corner| seed + body.corners[corner as usize]);
-        let (leaves, enters) = (outside(from), outside(to));
+        let [leaves, enters] = edge.map(|corner| outside[corner as usize]);
         if leaves.is_none() {
             kept.push(Kept { place: from - seed, wall: None, edge: [edge[0]; 2] });
         }

@@ -85,6 +85,28 @@ pub enum NoLayers {
         /// How many.
         cells: usize,
     },
+    /// The layers are too flat.
+    #[error(
+        "the layers are too flat: where the gap is narrowest a cell would be {flattest:.2} of its width high, and films between the layers would reach the walls; ask for {needed:.0} cells on each wall or more, or widen the gap"
+    )]
+    Flat {
+        /// The least height of a cell over its width.
+        flattest: f64,
+        /// Cells on each wall that would do.
+        needed: f64,
+    },
+    /// More cells than can be relaxed.
+    #[error(
+        "{cells} cells on each wall are too many: Newton's matrix for two layers takes some gigabytes and a minute a step from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
+    )]
+    Many {
+        /// Asked for.
+        cells: usize,
+        /// The most.
+        most: usize,
+        /// The width of so many cells.
+        width: f64,
+    },
     /// The cells on a wall do not cover it once.
     #[error(
         "the cells on a wall have Euler's number {found}, the wall has {expected}: too few cells for this gap"

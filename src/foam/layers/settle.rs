@@ -6,6 +6,7 @@
 
 use super::{
     NoLayers, Sheets,
+    division::Neighbours,
     plane_films::{PlaneFilms, bulges},
 };
 use crate::{
@@ -15,9 +16,9 @@ use crate::{
 use glam::DVec3;
 use std::{collections::VecDeque, ops::ControlFlow};
 
-/// Rounds, at the start of each of which the walls' bulges are measured, and the steps of each.
-const ROUNDS: u32 = 4;
-const STEPS: u32 = 60;
+/// Rounds, at the start of each of which the walls' bulges are measured and the neighbours listed, and the steps of each.
+const ROUNDS: u32 = 10;
+const STEPS: u32 = 30;
 /// Pairs of steps and changes of the gradient that are remembered.
 const MEMORY: usize = 12;
 /// No seed moves farther in a step, in spacings.
@@ -25,13 +26,13 @@ const LONGEST: f64 = 0.1;
 /// The part of the slope that a step must bring.
 const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: usize = 12;
-/// A force below which films count as settled: the change to curved films is larger.
-const SETTLED: f64 = 1e-3;
+/// A fall of the energy in a round, relative, below which films count as settled: curved films lower it by far more.
+const SETTLED: f64 = 2e-4;
 
 /// Places and weights of all cells, in units of the spacing.
 type Vector = Vec<[f64; 4]>;
 
-/// The two sheets, settled.
+/// The two sheets, settled, or as far as the rounds bring them.
 ///
 /// # Errors
 /// [`NoLayers`] if a cell is empty at the start.
@@ -42,16 +43,19 @@ pub(super) fn settled(
     progress: &mut Progress<'_>,
 ) -> Result<Sheets, NoLayers> {
     let mut sheets = sheets;
+    let mut memory: VecDeque<(Vector, Vector)> = VecDeque::new();
     for round in 0..ROUNDS {
-        let bulges = bulges(gap, domain, &sheets)?;
-        let mut films = PlaneFilms::new(gap, domain, &sheets, &bulges)?;
-        let mut memory: VecDeque<(Vector, Vector)> = VecDeque::new();
+        sheets = sheets.wrapped(domain);
+        let neighbours = Neighbours::new(domain, &sheets);
+        let bulges = bulges(gap, &neighbours, &sheets)?;
+        let mut films = PlaneFilms::new(gap, &neighbours, &sheets, &bulges)?;
+        let first = films.energy;
         for step in 0..STEPS {
             let done = f64::from(round * STEPS + step) / f64::from(ROUNDS * STEPS);
-            if largest(&films.gradient) < SETTLED || progress(done) == ControlFlow::Break(()) {
-                break;
+            if progress(done) == ControlFlow::Break(()) {
+                return Ok(sheets);
             }
-            let Some((moved, next, way)) = taken(gap, domain, &sheets, &films, &bulges, &memory) else {
+            let Some((moved, next, way)) = taken(gap, &neighbours, &sheets, &films, &bulges, &memory) else {
                 if memory.is_empty() {
                     break;
                 }
@@ -67,6 +71,9 @@ pub(super) fn settled(
             }
             (sheets, films) = (moved, next);
         }
+        if first - films.energy < SETTLED * first {
+            break;
+        }
     }
     Ok(sheets)
 }
@@ -74,7 +81,7 @@ pub(super) fn settled(
 /// A step down, and the way that it went; nothing if there is none.
 fn taken(
     gap: &Gap,
-    domain: &Domain,
+    neighbours: &Neighbours,
     sheets: &Sheets,
     films: &PlaneFilms,
     bulges: &[f64],
@@ -86,7 +93,7 @@ fn taken(
     for _ in 0..HALVINGS {
         let way: Vector = direction.iter().map(|by| by.map(|x| fraction * x)).collect();
         let moved = moved(sheets, &way);
-        if let Ok(next) = PlaneFilms::new(gap, domain, &moved, bulges)
+        if let Ok(next) = PlaneFilms::new(gap, neighbours, &moved, bulges)
             && next.energy <= films.energy + SUFFICIENT * fraction * slope
         {
             return Some((moved, next, way));
