@@ -14,7 +14,7 @@ use crate::{
         spatial::Bins,
     },
     index::checked_u32,
-    surface::{Gap, Period, WallSide},
+    surface::{Gap, GapKind, Period, SurfaceSamples, WallSide},
 };
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
@@ -89,10 +89,10 @@ impl Division {
     /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
     pub fn new(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
         let sheets = sheets.wrapped(domain);
-        let neighbours = Neighbours::new(domain, &sheets);
+        let (sight, neighbours) = (Sight::new(gap), Neighbours::new(domain, &sheets));
         let cells: Vec<Vec<Cut>> = (0..sheets.seeds.len())
             .into_par_iter()
-            .map(|cell| cut_cell(gap, &neighbours, &sheets, cell))
+            .map(|cell| cut_cell(&sight, &neighbours, &sheets, cell))
             .collect::<Result<_, _>>()?;
         let Sheets { seeds, lower, spacing, volumes, .. } = sheets;
         let period = domain.period();
@@ -177,14 +177,19 @@ impl Division {
     }
 }
 
-fn cut_cell(gap: &Gap, neighbours: &Neighbours, sheets: &Sheets, cell: usize) -> Result<Vec<Cut>, NoLayers> {
+fn cut_cell(
+    sight: &Sight<'_>,
+    neighbours: &Neighbours,
+    sheets: &Sheets,
+    cell: usize,
+) -> Result<Vec<Cut>, NoLayers> {
     let seed = sheets.seeds[cell];
     let Body { polyhedron, near } = neighbours.body(sheets, cell)?;
-    let outside = outside(gap, &polyhedron, seed);
+    let outside = sight.beyond(&polyhedron, seed);
     let faces = polyhedron.faces.iter().filter_map(|face| {
         let Behind::Cell(at) = face.half_space.behind else { return None };
         let Near { cell: neighbour, shift, .. } = near[at as usize];
-        let kept = within_walls(gap, &polyhedron, face, &outside, seed);
+        let kept = within_walls(sight.gap, &polyhedron, face, &outside, seed);
         let corners: Vec<_> = kept.into_iter().map(|kept| (seed + kept.place, kept.wall)).collect();
         (corners.len() > 2).then_some(Cut { neighbour, shift, corners })
     });
@@ -269,19 +274,54 @@ pub(super) struct Kept {
     pub(super) edge: [u32; 2],
 }
 
-/// The wall beyond which each corner of a body lies; none inside the gap.
-pub(super) fn outside(gap: &Gap, body: &Polyhedron, seed: DVec3) -> Vec<Option<WallSide>> {
-    let beyond = |&corner: &DVec3| {
-        let value = |side| gap.wall(side).value(seed + corner);
-        if value(WallSide::Lower) < 0.0 {
-            Some(WallSide::Lower)
-        } else if value(WallSide::Upper) > 0.0 {
-            Some(WallSide::Upper)
-        } else {
-            None
+/// Tells on which side of the walls places lie; between parallel walls by the level function of the middle surface where
+/// that decides, for the distance takes a search.
+pub(super) struct Sight<'a> {
+    pub(super) gap: &'a Gap,
+    /// The range of the middle surface's level function on each wall, with a margin.
+    on_wall: Option<[[f64; 2]; 2]>,
+}
+
+/// Lines per axis of the samples of that range, and its margin as a part of it.
+const SIGHT_LINES: usize = 30;
+const SIGHT_MARGIN: f64 = 0.1;
+
+impl<'a> Sight<'a> {
+    pub(super) fn new(gap: &'a Gap) -> Self {
+        let middle = gap.middle();
+        let searches = gap.kind() == GapKind::Parallel && !middle.is_distance();
+        let on_wall = searches.then(|| {
+            let samples = SurfaceSamples::new(middle.as_ref(), 0.0, SIGHT_LINES);
+            gap.walls().each_ref().map(|wall| {
+                let value = |p: DVec3| middle.value(p + wall.level * middle.normal(p));
+                let values = samples.points().iter().map(|point| value(point.position));
+                let start = (f64::INFINITY, f64::NEG_INFINITY);
+                let (low, high) = values.fold(start, |(l, h), x| (l.min(x), h.max(x)));
+                let margin = SIGHT_MARGIN * (high - low);
+                [low - margin, high + margin]
+            })
+        });
+        Self { gap, on_wall }
+    }
+
+    /// The wall beyond which each corner of a body lies; none inside the gap.
+    pub(super) fn beyond(&self, body: &Polyhedron, seed: DVec3) -> Vec<Option<WallSide>> {
+        let places = body.corners.iter().map(|&corner| seed + corner);
+        places.map(|p| WallSide::BOTH.into_iter().find(|&side| self.is_beyond(p, side))).collect()
+    }
+
+    fn is_beyond(&self, p: DVec3, side: WallSide) -> bool {
+        // Upwards out of the upper wall, downwards out of the lower one.
+        let sign = if side == WallSide::Upper { 1.0 } else { -1.0 };
+        if let Some(on_wall) = self.on_wall {
+            let level = self.gap.middle().value(p);
+            let [low, high] = on_wall[side as usize];
+            if !(low..=high).contains(&level) {
+                return sign * (level - low) > 0.0;
+            }
         }
-    };
-    body.corners.iter().map(beyond).collect()
+        sign * self.gap.wall(side).value(p) > 0.0
+    }
 }
 
 /// The part of a face inside the gap: corners that stay, and the places where its edges meet the walls.

@@ -7,7 +7,7 @@
 
 use super::{
     NoLayers, Sheets,
-    division::{Body, Kept, Near, Neighbours, outside, within_walls},
+    division::{Body, Kept, Near, Neighbours, Sight, within_walls},
 };
 use crate::{
     foam::{convert::as_f64, partition::polyhedron::Behind},
@@ -57,7 +57,7 @@ impl PlaneFilms {
     /// # Errors
     /// [`NoLayers::Seeds`] if a cell is empty.
     pub(super) fn new(
-        gap: &Gap,
+        sight: &Sight<'_>,
         neighbours: &Neighbours,
         sheets: &Sheets,
         bulges: &[f64],
@@ -67,8 +67,8 @@ impl PlaneFilms {
             .into_par_iter()
             .map(|cell| {
                 let body = neighbours.body(sheets, cell)?;
-                let bounded = Bounded::new(gap, &body, sheets.seeds[cell]);
-                Ok(bounded.share(gap, sheets, cell, bulges))
+                let bounded = Bounded::new(sight, &body, sheets.seeds[cell]);
+                Ok(bounded.share(sight.gap, sheets, cell, bulges))
             })
             .collect::<Result<_, NoLayers>>()?;
         let mut gradient = vec![[0.0; 4]; cells];
@@ -84,28 +84,32 @@ impl PlaneFilms {
 ///
 /// # Errors
 /// [`NoLayers::Seeds`] if a cell is empty.
-pub(super) fn bulges(gap: &Gap, neighbours: &Neighbours, sheets: &Sheets) -> Result<Vec<f64>, NoLayers> {
+pub(super) fn bulges(
+    sight: &Sight<'_>,
+    neighbours: &Neighbours,
+    sheets: &Sheets,
+) -> Result<Vec<f64>, NoLayers> {
     (0..sheets.seeds.len())
         .into_par_iter()
         .map(|cell| {
             let body = neighbours.body(sheets, cell)?;
-            let bounded = Bounded::new(gap, &body, sheets.seeds[cell]);
-            let bulge: f64 = WallSide::BOTH.into_iter().map(|side| bounded.bulge(gap, side)).sum();
+            let bounded = Bounded::new(sight, &body, sheets.seeds[cell]);
+            let bulge: f64 = WallSide::BOTH.into_iter().map(|side| bounded.bulge(sight.gap, side)).sum();
             Ok(bulge / sheets.spacing.powi(3))
         })
         .collect()
 }
 
 impl<'a> Bounded<'a> {
-    fn new(gap: &Gap, body: &'a Body, seed: DVec3) -> Self {
+    fn new(sight: &Sight<'_>, body: &'a Body, seed: DVec3) -> Self {
         let mut faces_at = vec![Vec::new(); body.polyhedron.corners.len()];
         for (at, face) in body.polyhedron.faces.iter().enumerate() {
             for &corner in &face.corners {
                 faces_at[corner as usize].push(at);
             }
         }
-        let outside = outside(gap, &body.polyhedron, seed);
-        let kept = |face| within_walls(gap, &body.polyhedron, face, &outside, seed);
+        let outside = sight.beyond(&body.polyhedron, seed);
+        let kept = |face| within_walls(sight.gap, &body.polyhedron, face, &outside, seed);
         Self { body, seed, faces_at, films: body.polyhedron.faces.iter().map(kept).collect() }
     }
 
@@ -309,8 +313,9 @@ mod tests {
             }
             let start = settled.wrapped(&domain);
             let neighbours = Neighbours::new(&domain, &start);
-            let bulges = bulges(&gap, &neighbours, &start).unwrap();
-            let films = PlaneFilms::new(&gap, &neighbours, &start, &bulges).unwrap();
+            let sight = Sight::new(&gap);
+            let bulges = bulges(&sight, &neighbours, &start).unwrap();
+            let films = PlaneFilms::new(&sight, &neighbours, &start, &bulges).unwrap();
             for (cell, axis) in
                 [(0, 0), (2, 1), (5, 2), (7, 3), (cells + 1, 0), (cells + 3, 2), (cells + 4, 3)]
             {
@@ -321,7 +326,7 @@ mod tests {
                     } else {
                         moved.weights[cell] += by * start.spacing.powi(2);
                     }
-                    PlaneFilms::new(&gap, &neighbours, &moved, &bulges).unwrap().energy
+                    PlaneFilms::new(&sight, &neighbours, &moved, &bulges).unwrap().energy
                 };
                 let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
                 // Second differences of an energy of some hundreds leave eight digits.

@@ -6,7 +6,7 @@
 
 use super::{
     NoLayers, Sheets,
-    division::Neighbours,
+    division::{Neighbours, Sight},
     plane_films::{PlaneFilms, bulges},
 };
 use crate::{
@@ -27,7 +27,7 @@ const LONGEST: f64 = 0.1;
 const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: usize = 12;
 /// A fall of the energy in a round, relative, below which films count as settled: curved films lower it by far more.
-const SETTLED: f64 = 2e-4;
+const SETTLED: f64 = 2e-5;
 
 /// Places and weights of all cells, in units of the spacing.
 type Vector = Vec<[f64; 4]>;
@@ -42,20 +42,22 @@ pub(super) fn settled(
     sheets: Sheets,
     progress: &mut Progress<'_>,
 ) -> Result<Sheets, NoLayers> {
+    let sight = Sight::new(gap);
     let mut sheets = sheets;
     let mut memory: VecDeque<(Vector, Vector)> = VecDeque::new();
     for round in 0..ROUNDS {
         sheets = sheets.wrapped(domain);
         let neighbours = Neighbours::new(domain, &sheets);
-        let bulges = bulges(gap, &neighbours, &sheets)?;
-        let mut films = PlaneFilms::new(gap, &neighbours, &sheets, &bulges)?;
+        let bulges = bulges(&sight, &neighbours, &sheets)?;
+        let mut films = PlaneFilms::new(&sight, &neighbours, &sheets, &bulges)?;
         let first = films.energy;
         for step in 0..STEPS {
             let done = f64::from(round * STEPS + step) / f64::from(ROUNDS * STEPS);
             if progress(done) == ControlFlow::Break(()) {
                 return Ok(sheets);
             }
-            let Some((moved, next, way)) = taken(gap, &neighbours, &sheets, &films, &bulges, &memory) else {
+            let Some((moved, next, way)) = taken(&sight, &neighbours, &sheets, &films, &bulges, &memory)
+            else {
                 if memory.is_empty() {
                     break;
                 }
@@ -80,7 +82,7 @@ pub(super) fn settled(
 
 /// A step down, and the way that it went; nothing if there is none.
 fn taken(
-    gap: &Gap,
+    sight: &Sight<'_>,
     neighbours: &Neighbours,
     sheets: &Sheets,
     films: &PlaneFilms,
@@ -93,7 +95,7 @@ fn taken(
     for _ in 0..HALVINGS {
         let way: Vector = direction.iter().map(|by| by.map(|x| fraction * x)).collect();
         let moved = moved(sheets, &way);
-        if let Ok(next) = PlaneFilms::new(gap, neighbours, &moved, bulges)
+        if let Ok(next) = PlaneFilms::new(sight, neighbours, &moved, bulges)
             && next.energy <= films.energy + SUFFICIENT * fraction * slope
         {
             return Some((moved, next, way));
