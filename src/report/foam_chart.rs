@@ -2,7 +2,7 @@
 
 use super::{
     figure::{FONT, Figure},
-    legend::legend,
+    legend::series_legend,
     palette::{BLUE, Colour, INK, ORANGE},
 };
 use crate::foam::{checkpoint::StepRecord, seeds::TracePoint};
@@ -154,7 +154,7 @@ impl TwoLines {
             .map_err(failed)?
             .label(self.right.label)
             .legend(sample(ORANGE));
-        legend(&mut chart, SeriesLabelPosition::UpperRight).map_err(failed)?;
+        series_legend(&mut chart, SeriesLabelPosition::UpperRight).map_err(failed)?;
         root.present().map_err(failed)?;
         drop((chart, root));
         Ok(Figure::from_svg(svg))

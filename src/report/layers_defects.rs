@@ -2,7 +2,7 @@
 
 use super::{
     figure::{Anchor, Drawing, FONT, Figure, FigureError},
-    legend::legend,
+    legend::series_legend,
     palette::{BLUE, Colour, INK, SKY, VERMILION, of_sides},
     render::{Camera, Canvas, Corner},
 };
@@ -244,7 +244,7 @@ fn panel(
     let style = rgb(VERMILION).stroke_width(3);
     let drawn = chart.draw_series(LineSeries::new(found, style)).map_err(failed)?;
     drawn.label("found").legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
-    legend(&mut chart, SeriesLabelPosition::UpperRight).map_err(failed)
+    series_legend(&mut chart, SeriesLabelPosition::UpperRight).map_err(failed)
 }
 
 /// The share of the trials in each bar.

@@ -10,7 +10,7 @@ use plotters::{chart::ChartContext, coord::CoordTranslate, drawing::DrawingAreaE
 ///
 /// # Errors
 /// Those of the drawing.
-pub(super) fn legend<'a, B: DrawingBackend + 'a, C: CoordTranslate>(
+pub(super) fn series_legend<'a, B: DrawingBackend + 'a, C: CoordTranslate>(
     chart: &mut ChartContext<'a, B, C>,
     corner: SeriesLabelPosition,
 ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {

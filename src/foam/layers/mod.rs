@@ -15,9 +15,14 @@
 //! | side counts; angles at corners | `figures.rs` |
 //! | how the defects of the two layers sit to each other | `companions.rs` |
 //!
+//! Each layer fills its side of the gap up to the middle surface, in equal cells. Annealed layers that are less high than half
+//! a cell's width are refused: there films between the layers reach the walls, and the foam of least energy is no foam of two
+//! layers.
+//!
 //! Not promised: balance. A change that would take a cell to the other wall, away from its own, or to a second film with a
 //! neighbour is not made, nor one at corners where more than four cells meet, as in the bees' arrangement; a foam that needs it
-//! ends as stalled, with the borders that vanish. Few cells on a sphere do, and layers much flatter than a cell is wide.
+//! ends as stalled, with the borders that vanish. Between curved walls, where one wall's cells are much narrower than the
+//! other's, short borders hold up the descent.
 //!
 //! Sources: L. Fejes Tóth, "What the bees know and what they do not know", Bull. Amer. Math. Soc. 70 (1964); D. Weaire and
 //! R. Phelan, "Optimal design of honeycombs", Nature 367 (1994), who made both arrangements in foam between glass plates.
@@ -97,7 +102,7 @@ pub enum NoLayers {
     },
     /// More cells than can be relaxed.
     #[error(
-        "{cells} cells on each wall are too many: Newton's matrix for two layers takes some gigabytes and a minute a step from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
+        "{cells} cells on each wall are too many: Newton's matrix for two layers takes minutes a step from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
     )]
     Many {
         /// Asked for.
