@@ -33,7 +33,7 @@ fn made(
     let gap = space.gap().unwrap();
     let sheets = sheets(space, &gap, arrangement, cells, 1, &mut |_| ControlFlow::Continue(()))?;
     let domain = space.domain().unwrap();
-    let division = Division::new(&gap, &domain, &sheets.seeds, sheets.lower, sheets.spacing)?;
+    let division = Division::new(&gap, &domain, &sheets)?;
     let settings = LayerSettings { fineness, ..LayerSettings::new(arrangement, sheets.spacing) };
     relaxed(division, &gap, &settings, &mut |_: &DescentStep<'_>| ControlFlow::Continue(()))
 }
@@ -130,11 +130,17 @@ fn layers_that_do_not_fit_are_refused() {
     let sown = |space: FoamSpace, arrangement, cells| {
         let gap = space.gap().unwrap();
         let sheets = sheets(&space, &gap, arrangement, cells, 1, &mut |_| ControlFlow::Continue(()))?;
-        Division::new(&gap, &space.domain().unwrap(), &sheets.seeds, sheets.lower, sheets.spacing)
+        Division::new(&gap, &space.domain().unwrap(), &sheets)
     };
     let low = FoamSpace::Plane { periods: [4.0, 8.0 / 3.0_f64.sqrt()], height: 0.3 };
     assert!(sown(low, Arrangement::Rhombic, 16).is_err());
     assert!(matches!(sown(space(), Arrangement::Toth, 14), Err(NoLayers::Rows { .. })));
     let sphere = FoamSpace::Sphere { radii: [1.0, 1.5] };
     assert!(matches!(sown(sphere, Arrangement::Toth, 16), Err(NoLayers::Curved { .. })));
+    // Cells a third as high as wide, and more cells than memory holds.
+    let Err(NoLayers::Flat { flattest, needed }) = sown(sphere, Arrangement::Annealed, 16) else {
+        panic!("flat layers are refused");
+    };
+    assert!((0.1..0.5).contains(&flattest) && needed > 64.0, "{flattest} {needed}");
+    assert!(matches!(sown(space(), Arrangement::Annealed, 4000), Err(NoLayers::Many { .. })));
 }

@@ -91,8 +91,7 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     let sheets =
         sheets(&settings.space, &gap, arrangement, cells, settings.seeds.seed, &mut |_| interrupt::flow());
     let sheets = sheets.map_err(failed)?;
-    let division =
-        Division::new(&gap, &domain, &sheets.seeds, sheets.lower, sheets.spacing).map_err(failed)?;
+    let division = Division::new(&gap, &domain, &sheets).map_err(failed)?;
     // The same number of elements on each half side; the default is the coarsest.
     let fineness = if fine { settings.relax.strips.along } else { 1 };
     let tolerance = settings.relax.tolerance.max(1e-10);

@@ -3,6 +3,7 @@
 use super::{
     figure::{Anchor, Drawing, FONT, Figure, FigureError},
     folder::{OutputError, OutputFolder},
+    legend::series_legend,
     palette::{BLUE, Colour, INK, VERMILION, viridis},
     render::{Camera, Canvas, Corner},
 };
@@ -184,14 +185,7 @@ fn panel(
     let dots = points.iter().map(|p| Circle::new((p.0, p.1), 4, rgb(BLUE).filled()));
     let drawn = chart.draw_series(dots).map_err(failed)?;
     drawn.label("bubble").legend(|(x, y)| Circle::new((x + 10, y), 4, rgb(BLUE).filled()));
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperMiddle)
-        .label_font(text())
-        .border_style(rgb(INK).mix(0.3))
-        .background_style(WHITE.mix(0.8))
-        .draw()
-        .map_err(failed)
+    series_legend(&mut chart, SeriesLabelPosition::UpperMiddle).map_err(failed)
 }
 
 /// Room above the points for the legend, as a part of their range.

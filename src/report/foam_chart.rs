@@ -2,6 +2,7 @@
 
 use super::{
     figure::{FONT, Figure},
+    legend::series_legend,
     palette::{BLUE, Colour, INK, ORANGE},
 };
 use crate::foam::{checkpoint::StepRecord, seeds::TracePoint};
@@ -153,14 +154,7 @@ impl TwoLines {
             .map_err(failed)?
             .label(self.right.label)
             .legend(sample(ORANGE));
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .label_font(text())
-            .border_style(rgb(INK).mix(0.3))
-            .background_style(WHITE.mix(0.8))
-            .draw()
-            .map_err(failed)?;
+        series_legend(&mut chart, SeriesLabelPosition::UpperRight).map_err(failed)?;
         root.present().map_err(failed)?;
         drop((chart, root));
         Ok(Figure::from_svg(svg))

@@ -2,6 +2,7 @@
 
 use super::{
     figure::{Anchor, Drawing, FONT, Figure, FigureError},
+    legend::series_legend,
     palette::{BLUE, Colour, INK, SKY, VERMILION, of_sides},
     render::{Camera, Canvas, Corner},
 };
@@ -243,14 +244,7 @@ fn panel(
     let style = rgb(VERMILION).stroke_width(3);
     let drawn = chart.draw_series(LineSeries::new(found, style)).map_err(failed)?;
     drawn.label("found").legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .label_font(text())
-        .border_style(rgb(INK).mix(0.3))
-        .background_style(WHITE.mix(0.8))
-        .draw()
-        .map_err(failed)
+    series_legend(&mut chart, SeriesLabelPosition::UpperRight).map_err(failed)
 }
 
 /// The share of the trials in each bar.

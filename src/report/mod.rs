@@ -38,6 +38,7 @@ pub mod foam_surface;
 pub mod folder;
 pub mod layers;
 pub mod layers_defects;
+mod legend;
 pub mod page;
 mod page_photo;
 mod page_scene;

@@ -192,6 +192,18 @@ impl Gap {
         Self { middle: self.middle.clone(), walls, kind: self.kind }
     }
 
+    /// The two halves of the gap: from the lower wall to the middle surface, and from there to the upper wall.
+    #[must_use]
+    pub fn halves(&self) -> [Self; 2] {
+        let [lower, upper] = self.walls.clone();
+        let middle = Wall { field: lower.field.clone(), level: 0.0 };
+        [[lower, middle.clone()], [middle, upper]].map(|walls| Self {
+            middle: self.middle.clone(),
+            walls,
+            kind: self.kind,
+        })
+    }
+
     /// The middle surface: level 0 of this.
     #[must_use]
     pub fn middle(&self) -> &Arc<dyn LevelSet> {

@@ -8,7 +8,7 @@ use super::{Chart, NoBubble, extrapolate::limit_with_error};
 use crate::foam::{
     complex::{
         Complex, Element, Film, Motion, Node, NodeId, NodeImage, Places, Region, RegionId, RegionImage,
-        RegionKind, Shape, WallId,
+        RegionKind, Shape, WallId, coons,
     },
     convert::as_f64,
     relax::{Descended, Descent, DescentSettings},
@@ -190,7 +190,7 @@ pub fn cluster(gap: &Gap, volumes: &[f64], place: DVec3) -> Result<Cluster, NoBu
     let [first, second] = tries(volumes.len(), &chart, scale);
     let tried = |pieces| on_meshes(&chart, &Plan::new(volumes.len()).in_pieces(pieces), scale, volumes);
     match tried(first) {
-        Err(NoBubble::Unsolved { .. }) => tried(second),
+        Err(NoBubble::Unsolved { .. } | NoBubble::Unbalanced { .. }) => tried(second),
         other => other,
     }
 }
@@ -240,7 +240,8 @@ fn settle(
     let descended =
         descent.descend(&settings, &mut |_| ControlFlow::Continue(())).map_err(|_| unsolved(f64::NAN))?;
     if descended.residuals.force > 1e-8 {
-        return Err(unsolved(descended.residuals.force));
+        let (steps, force) = (descended.steps, descended.residuals.force);
+        return Err(NoBubble::Unbalanced { place: chart.place(), steps, force });
     }
     Ok((descent, descended))
 }
@@ -296,7 +297,7 @@ fn laid(chart: &Chart<'_>, plan: &Plan, mesh: Mesh, scale: f64) -> Result<(Compl
         for at in 1..columns - 1 {
             column(plan.point(arc, as_f64(at) / as_f64(columns - 1)), &mut places)?;
             for row in 0..rows {
-                let masters = coons(at, columns - 1, row, rows - 1, &node);
+                let masters = coons([at, columns - 1], [row, rows - 1], node);
                 nodes.push(Node { walls: walls(row), motion: Motion::Inner(masters) });
             }
         }
@@ -322,29 +323,6 @@ fn laid(chart: &Chart<'_>, plan: &Plan, mesh: Mesh, scale: f64) -> Result<(Compl
     };
     complex.retract(&mut places).map_err(|node| NoBubble::Wide { place: places[node] })?;
     Ok((complex, places))
-}
-
-/// The masters of an inner node: the two borders, and inside the film its edges on the walls, as a Coons patch.
-fn coons(
-    column: usize,
-    last: usize,
-    row: usize,
-    top: usize,
-    node: &impl Fn(usize, usize) -> NodeId,
-) -> Vec<(NodeId, f64)> {
-    let (u, v) = (as_f64(column) / as_f64(last), as_f64(row) / as_f64(top));
-    let mut masters = vec![(node(0, row), 1.0 - u), (node(last, row), u)];
-    if row != 0 && row != top {
-        masters.extend([
-            (node(column, 0), 1.0 - v),
-            (node(column, top), v),
-            (node(0, 0), -(1.0 - u) * (1.0 - v)),
-            (node(last, 0), -u * (1.0 - v)),
-            (node(0, top), -(1.0 - u) * v),
-            (node(last, top), -u * v),
-        ]);
-    }
-    masters
 }
 
 /// The perimeter of two or three equal bubbles in the plane over the root of the area of one, 6.3591298… for two: arcs of

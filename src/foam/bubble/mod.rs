@@ -106,6 +106,18 @@ pub enum NoBubble {
         /// The last step over the radius.
         residual: f64,
     },
+    /// A cluster did not come to balance.
+    #[error(
+        "the cluster from {place} does not come to balance: after {steps} steps the largest force is still {force:.1e} of the tension. Nothing holds a cluster where it starts, and it slides over the surface until its films are too oblique for their elements; start it where it can stay, or with less volume"
+    )]
+    Unbalanced {
+        /// Where it started.
+        place: DVec3,
+        /// Steps done.
+        steps: usize,
+        /// The largest force, in units of tension × size.
+        force: f64,
+    },
     /// The free bubble did not come to rest.
     #[error("the free bubble still slides after {steps} steps, at {place}")]
     Restless {

@@ -10,6 +10,7 @@ mod strips;
 
 pub use shape::Shape;
 pub(crate) use shape::{CurvePoint, MOST_NODES, ShapePoint, curve_points, quadratic};
+pub(in crate::foam) use strips::coons;
 pub use strips::{NoExtrusion, Strips};
 
 use crate::{

@@ -126,21 +126,8 @@ impl Strips {
     /// Inner nodes keep their place between the borders and between the walls (a Coons patch of the motions at the film's
     /// four sides). Following the borders alone, a film that slides along a curved wall would leave its own middle behind.
     fn inner_motion(self, network: &Network, edge: EdgeId, column: usize, row: usize) -> Motion {
-        let (last, top) = (self.columns() - 1, self.rows() - 1);
-        let (u, v) = (real(column) / real(last), real(row) / real(top));
         let node = |column, row| self.film_node(network, edge, column, row).node;
-        let mut masters = vec![(node(0, row), 1.0 - u), (node(last, row), u)];
-        if row != 0 && row != top {
-            masters.extend([
-                (node(column, 0), 1.0 - v),
-                (node(column, top), v),
-                (node(0, 0), -(1.0 - u) * (1.0 - v)),
-                (node(last, 0), -u * (1.0 - v)),
-                (node(0, top), -(1.0 - u) * v),
-                (node(last, top), -u * v),
-            ]);
-        }
-        Motion::Inner(masters)
+        Motion::Inner(coons([column, self.columns() - 1], [row, self.rows() - 1], node))
     }
 
     fn film(self, network: &Network, edge: EdgeId) -> Film {
@@ -398,4 +385,26 @@ fn spread_curve(network: &Network, places: &mut Places, ids: &[NodeImage]) -> f6
         places[ids[at].node] = place - translation(&ids[at]);
     }
     largest
+}
+
+/// The masters of an inner node of a strip, by its column and row and the last of each: the two borders, and inside the film
+/// its edges on the walls, too, as a Coons patch.
+pub(in crate::foam) fn coons(
+    [column, last]: [usize; 2],
+    [row, top]: [usize; 2],
+    node: impl Fn(usize, usize) -> NodeId,
+) -> Vec<(NodeId, f64)> {
+    let (u, v) = (real(column) / real(last), real(row) / real(top));
+    let mut masters = vec![(node(0, row), 1.0 - u), (node(last, row), u)];
+    if row != 0 && row != top {
+        masters.extend([
+            (node(column, 0), 1.0 - v),
+            (node(column, top), v),
+            (node(0, 0), -(1.0 - u) * (1.0 - v)),
+            (node(last, 0), -u * (1.0 - v)),
+            (node(0, top), -(1.0 - u) * v),
+            (node(last, top), -u * v),
+        ]);
+    }
+    masters
 }

@@ -1,10 +1,11 @@
 //! Two sheets of seeds.
 
-use super::{Division, NoLayers, plane_end, spacing};
+use super::{Division, NoLayers, plane_end, settle::settled, spacing};
 use crate::{
     foam::{
         convert::as_f64,
         domain::Domain,
+        ground::gap_volume,
         seeds::{Progress, SeedSettings, sow},
         setup::FoamSpace,
     },
@@ -42,10 +43,23 @@ impl Arrangement {
 pub struct Sheets {
     /// The seeds, those of the lower layer first.
     pub seeds: Vec<DVec3>,
+    /// Their weights, in units of area: a heavier seed has the larger cell.
+    pub weights: Vec<f64>,
     /// How many belong to the lower layer.
     pub lower: usize,
     /// The distance of neighbours in a layer, as of a hexagonal lattice.
     pub spacing: f64,
+    /// The volume that each cell of the lower and of the upper layer shall have: together the layers fill the gap up to its
+    /// middle surface.
+    pub volumes: [f64; 2],
+}
+
+impl Sheets {
+    /// The same sheets with their seeds inside the primary box.
+    pub(super) fn wrapped(&self, domain: &Domain) -> Self {
+        let seeds = self.seeds.iter().map(|&seed| domain.wrap(seed).0).collect();
+        Self { seeds, weights: self.weights.clone(), ..*self }
+    }
 }
 
 /// Rows may be stretched by this part against those of regular hexagons.
@@ -68,21 +82,21 @@ pub fn sheets(
 ) -> Result<Sheets, NoLayers> {
     match (arrangement, *space) {
         (Arrangement::Annealed, _) => annealed(gap, cells, seed, progress),
-        (_, FoamSpace::Plane { periods, .. }) => rows(arrangement, periods, cells),
+        (_, FoamSpace::Plane { periods, height }) => rows(arrangement, periods, height, cells),
         _ => Err(NoLayers::Curved { pattern: arrangement.name(), surface: gap.middle().name() }),
     }
 }
 
 /// Rows of regular hexagons, the upper layer shifted as the arrangement says. The seeds' height sets the slope of the plane
 /// films between the layers to that of least area.
-fn rows(arrangement: Arrangement, periods: [f64; 2], cells: usize) -> Result<Sheets, NoLayers> {
+fn rows(arrangement: Arrangement, periods: [f64; 2], height: f64, cells: usize) -> Result<Sheets, NoLayers> {
     let fits = [false, true].into_iter().flat_map(|turned| {
         let [along, across] = if turned { [periods[1], periods[0]] } else { periods };
         (2..=cells).step_by(2).filter(move |rows| cells.is_multiple_of(*rows)).map(move |rows| {
             let columns = cells / rows;
-            let (pitch, height) = (along / as_f64(columns), across / as_f64(rows));
-            let ratio = height / (pitch * 0.75_f64.sqrt());
-            (ratio.max(1.0 / ratio) - 1.0, rows, columns, turned, pitch, height)
+            let (pitch, step) = (along / as_f64(columns), across / as_f64(rows));
+            let ratio = step / (pitch * 0.75_f64.sqrt());
+            (ratio.max(1.0 / ratio) - 1.0, rows, columns, turned, pitch, step)
         })
     });
     let best = fits.min_by(|a, b| a.0.total_cmp(&b.0));
@@ -93,17 +107,17 @@ fn rows(arrangement: Arrangement, periods: [f64; 2], cells: usize) -> Result<She
         columns,
         stretch: 100.0 * stretch,
     };
-    let Some((stretch, rows, columns, turned, pitch, height)) = best else {
+    let Some((stretch, rows, columns, turned, pitch, step)) = best else {
         return Err(unfit(0, 0, f64::NAN));
     };
     if stretch > STRETCH {
         return Err(unfit(rows, columns, stretch));
     }
-    let side = (pitch * height / 1.5 / 3.0_f64.sqrt()).sqrt();
+    let side = (pitch * step / 1.5 / 3.0_f64.sqrt()).sqrt();
     let end = plane_end(arrangement).map_or(0.25, |end| end.height);
     let (shift, z) = match arrangement {
         Arrangement::Toth => ([0.5 * pitch, 0.0], 3.0 * side / (16.0 * end)),
-        Arrangement::Rhombic | Arrangement::Annealed => ([0.5 * pitch, height / 3.0], side / (4.0 * end)),
+        Arrangement::Rhombic | Arrangement::Annealed => ([0.5 * pitch, step / 3.0], side / (4.0 * end)),
     };
     let mut seeds = Vec::with_capacity(2 * cells);
     for (layer, z) in [(0.0, -z), (1.0, z)] {
@@ -111,12 +125,19 @@ fn rows(arrangement: Arrangement, periods: [f64; 2], cells: usize) -> Result<She
             for column in 0..columns {
                 let odd = if row % 2 == 1 { 0.5 } else { 0.0 };
                 let x = (as_f64(column) + odd) * pitch + layer * shift[0];
-                let y = as_f64(row) * height + layer * shift[1];
+                let y = as_f64(row) * step + layer * shift[1];
                 seeds.push(if turned { DVec3::new(y, x, z) } else { DVec3::new(x, y, z) });
             }
         }
     }
-    Ok(Sheets { seeds, lower: cells, spacing: spacing(periods[0] * periods[1], cells) })
+    let area = periods[0] * periods[1];
+    Ok(Sheets {
+        weights: vec![0.0; seeds.len()],
+        seeds,
+        lower: cells,
+        spacing: spacing(area, cells),
+        volumes: [area * height / as_f64(2 * cells); 2],
+    })
 }
 
 /// How far from the middle surface the seeds of a layer are put, in spacings: where those of rows stand, so that the films
@@ -130,6 +151,14 @@ const FILLED: f64 = 0.65;
 /// The part of the least radius of curvature within which seeds stay: normals cross beyond it.
 const WITHIN: f64 = 0.8;
 
+/// Cells less high than this part of their spacing are refused: the films between the layers, which slope as much as cells
+/// are wide, lower their area by reaching the walls.
+const FLATTEST: f64 = 0.5;
+/// The height, in spacings, from which on layers keep apart on all surfaces that were tried.
+const COMFORTABLE: f64 = 0.7;
+/// The most cells on each wall: a step for 64 takes 2 s of one core, and the work grows with the power 3/2 of the cells.
+const MOST_CELLS: usize = 1000;
+
 /// How much farther seeds are put where the cells of the nearest ones reach the other wall.
 const FARTHER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 
@@ -138,8 +167,18 @@ const FARTHER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> Result<Sheets, NoLayers> {
     let middle = gap.middle().as_ref();
     let domain = Domain::of_surface(middle);
+    let middle_samples = SurfaceSamples::new(middle, 0.0, AREA_LINES);
+    let spacing = spacing(middle_samples.area(), cells);
+    if cells > MOST_CELLS {
+        return Err(NoLayers::Many {
+            cells,
+            most: MOST_CELLS,
+            width: spacing * (as_f64(cells) / as_f64(MOST_CELLS)).sqrt(),
+        });
+    }
+    let [below, above] = gap.halves().map(|half| gap_volume(&half, &domain) / as_f64(cells));
+    refuse_flat(gap, &middle_samples, [below, above], cells)?;
     let settings = SeedSettings::new(cells, seed);
-    let spacing = spacing(SurfaceSamples::new(middle, 0.0, AREA_LINES).area(), cells);
     let mut places = Vec::with_capacity(2 * cells);
     for layer in 0..2 {
         let sown = sow(gap, &domain, &settings, layer, &mut |share| {
@@ -155,16 +194,33 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
             let side = if at < cells { -1.0 } else { 1.0 };
             Ok(place + side * away.min(WITHIN / bend) * middle.normal(place))
         });
-        Ok(Sheets { seeds: seeds.collect::<Result<_, NoLayers>>()?, lower: cells, spacing })
+        let seeds: Vec<DVec3> = seeds.collect::<Result<_, NoLayers>>()?;
+        Ok(Sheets { weights: vec![0.0; seeds.len()], seeds, lower: cells, spacing, volumes: [below, above] })
     };
-    let fits = |sheets: &Sheets| Division::new(gap, &domain, &sheets.seeds, cells, spacing).is_ok();
+    let fits = |sheets: &Sheets| Division::new(gap, &domain, sheets).is_ok();
     for farther in FARTHER {
         let sheets = moved(farther)?;
         if fits(&sheets) {
-            return Ok(sheets);
+            return settled(gap, &domain, sheets, progress);
         }
     }
-    moved(FARTHER[0])
+    settled(gap, &domain, moved(FARTHER[0])?, progress)
+}
+
+/// Refuses layers that are so flat that films between the layers would reach the walls.
+fn refuse_flat(gap: &Gap, middle: &SurfaceSamples, volumes: [f64; 2], cells: usize) -> Result<(), NoLayers> {
+    for (wall, volume) in gap.walls().iter().zip(volumes) {
+        // A cell's height, to first order in the gap, over the spacing of neighbours of its volume.
+        let height = |place: DVec3| wall.level.abs() / wall.field.gradient(place).length();
+        let flat = |place: DVec3| height(place).powi(3).sqrt() / (volume * 2.0 / 3.0_f64.sqrt()).sqrt();
+        let flattest = middle.points().iter().map(|point| flat(point.position)).fold(f64::INFINITY, f64::min);
+        if flattest < FLATTEST {
+            // The spacing falls with the root of the number of cells.
+            let needed = (COMFORTABLE / flattest).powi(2) * as_f64(cells);
+            return Err(NoLayers::Flat { flattest, needed });
+        }
+    }
+    Ok(())
 }
 
 /// How far from the middle surface a seed is put.

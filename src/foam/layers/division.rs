@@ -1,11 +1,11 @@
-//! The Voronoi cells of two sheets of seeds, cut off by the walls: cells, films as polygons, corners.
+//! The power cells of two sheets of weighted seeds, cut off by the walls: cells, films as polygons, corners.
 //!
 //! Each cell is a convex polyhedron, cut from a cube by the half spaces towards its neighbours. What the walls leave of it
 //! is decided corner by corner: corners inside the gap stay, an edge that leaves the gap ends where it meets the wall, and a
 //! film that is cut off ends in an edge on the wall. Corners of neighbouring cells that coincide become one, so that
 //! arrangements of high symmetry, where more than four cells meet, come out right.
 
-use super::NoLayers;
+use super::{NoLayers, Sheets};
 use crate::foam::partition::polyhedron::{Behind, Face, HalfSpace, Polyhedron};
 use crate::{
     foam::{
@@ -14,7 +14,7 @@ use crate::{
         spatial::Bins,
     },
     index::checked_u32,
-    surface::{Gap, Period, WallSide},
+    surface::{Gap, GapKind, Period, SurfaceSamples, WallSide},
 };
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
@@ -58,6 +58,8 @@ pub struct Division {
     pub seeds: Vec<DVec3>,
     /// How many of them belong to the lower layer.
     pub lower: usize,
+    /// The volume that each cell of the lower and of the upper layer shall have.
+    pub volumes: [f64; 2],
     /// The lattice.
     pub period: Period,
     /// All corners.
@@ -81,26 +83,20 @@ struct Cut {
 }
 
 impl Division {
-    /// Divides the gap between `seeds`, the first `lower` of which belong to the lower layer. `spacing` is about the
-    /// distance of neighbouring seeds.
+    /// Divides the gap between the seeds of `sheets`.
     ///
     /// # Errors
     /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
-    pub fn new(
-        gap: &Gap,
-        domain: &Domain,
-        seeds: &[DVec3],
-        lower: usize,
-        spacing: f64,
-    ) -> Result<Self, NoLayers> {
-        let seeds: Vec<DVec3> = seeds.iter().map(|&seed| domain.wrap(seed).0).collect();
-        let bins = Bins::new(domain, spacing, &seeds);
-        let cells: Vec<Vec<Cut>> = (0..seeds.len())
+    pub fn new(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
+        let sheets = sheets.wrapped(domain);
+        let (sight, neighbours) = (Sight::new(gap), Neighbours::new(domain, &sheets));
+        let cells: Vec<Vec<Cut>> = (0..sheets.seeds.len())
             .into_par_iter()
-            .map(|cell| cut_cell(gap, &bins, &seeds, cell, spacing))
+            .map(|cell| cut_cell(&sight, &neighbours, &sheets, cell))
             .collect::<Result<_, _>>()?;
-        let mut division =
-            Self { seeds, lower, period: domain.period(), corners: Vec::new(), polygons: Vec::new() };
+        let Sheets { seeds, lower, spacing, volumes, .. } = sheets;
+        let period = domain.period();
+        let mut division = Self { seeds, lower, volumes, period, corners: Vec::new(), polygons: Vec::new() };
         let mut joiner = Joiner::new(domain.period(), JOINED * spacing);
         for (cell, cuts) in cells.into_iter().enumerate() {
             for cut in cuts {
@@ -182,64 +178,174 @@ impl Division {
 }
 
 fn cut_cell(
-    gap: &Gap,
-    bins: &Bins,
-    seeds: &[DVec3],
+    sight: &Sight<'_>,
+    neighbours: &Neighbours,
+    sheets: &Sheets,
     cell: usize,
-    spacing: f64,
 ) -> Result<Vec<Cut>, NoLayers> {
-    let seed = seeds[cell];
-    let mut near: Vec<(f64, usize, Image, DVec3)> = Vec::new();
-    bins.for_each_near(seed, REACH * spacing, |other, image, place| {
-        if other != cell || image != Image::IDENTITY {
-            near.push((place.distance_squared(seed), other, image, place - seed));
-        }
-    });
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
-    let mut body = Polyhedron::cube(CUBE * spacing);
-    for (at, &(square, ..)) in near.iter().enumerate() {
-        if square > 4.0 * body.radius_squared() {
-            break;
-        }
-        let way = near[at].3;
-        let half_space = HalfSpace {
-            normal: way.normalize_or_zero(),
-            offset: 0.5 * square.sqrt(),
-            behind: Behind::Cell(checked_u32(at)),
-        };
-        // A cut that only grazes corners takes nothing away.
-        let slack = HalfSpace { offset: half_space.offset + 1e-12 * spacing, ..half_space };
-        body.cut(slack).map_err(|_| NoLayers::Seeds { place: seed })?;
-    }
-    let faces = body.faces.iter().filter_map(|face| {
+    let seed = sheets.seeds[cell];
+    let Body { polyhedron, near } = neighbours.body(sheets, cell)?;
+    let outside = sight.beyond(&polyhedron, seed);
+    let faces = polyhedron.faces.iter().filter_map(|face| {
         let Behind::Cell(at) = face.half_space.behind else { return None };
-        let (_, neighbour, image, _) = near[at as usize];
-        let corners = within_walls(gap, &body, face, seed);
-        (corners.len() > 2).then(|| Cut { neighbour, shift: image.shift(), corners })
+        let Near { cell: neighbour, shift, .. } = near[at as usize];
+        let kept = within_walls(sight.gap, &polyhedron, face, &outside, seed);
+        let corners: Vec<_> = kept.into_iter().map(|kept| (seed + kept.place, kept.wall)).collect();
+        (corners.len() > 2).then_some(Cut { neighbour, shift, corners })
     });
     Ok(faces.collect())
 }
 
+/// Who may touch whom: for each seed, the seeds near it and their images in periods.
+pub(super) struct Neighbours {
+    near: Vec<Vec<(usize, IVec3)>>,
+    period: Period,
+}
+
+/// A seed near another.
+pub(super) struct Near {
+    pub(super) cell: usize,
+    pub(super) shift: IVec3,
+    /// The way to it.
+    pub(super) way: DVec3,
+}
+
+/// A cell round its seed as the origin, before the walls cut it off; and the seeds that its faces are numbered by.
+pub(super) struct Body {
+    pub(super) polyhedron: Polyhedron,
+    pub(super) near: Vec<Near>,
+}
+
+impl Neighbours {
+    /// Of seeds inside the primary box, the nearest first.
+    pub(super) fn new(domain: &Domain, sheets: &Sheets) -> Self {
+        let Sheets { seeds, spacing, .. } = sheets;
+        let bins = Bins::new(domain, *spacing, seeds);
+        let near = seeds.par_iter().enumerate().map(|(cell, &seed)| {
+            let mut near = Vec::new();
+            bins.for_each_near(seed, REACH * spacing, |other, image, place| {
+                if other != cell || image != Image::IDENTITY {
+                    near.push((place.distance_squared(seed), other, image.shift()));
+                }
+            });
+            let key = |&(_, other, shift): &(f64, usize, IVec3)| (other, shift.to_array());
+            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(key(a).cmp(&key(b))));
+            near.into_iter().map(|(_, other, shift)| (other, shift)).collect()
+        });
+        Self { near: near.collect(), period: domain.period() }
+    }
+
+    /// The cell of a seed; the seeds may have moved since the neighbours were listed.
+    ///
+    /// # Errors
+    /// [`NoLayers::Seeds`] if nothing is left of it.
+    pub(super) fn body(&self, sheets: &Sheets, cell: usize) -> Result<Body, NoLayers> {
+        let (seed, own, spacing) = (sheets.seeds[cell], sheets.weights[cell], sheets.spacing);
+        let near = self.near[cell].iter().map(|&(other, shift)| {
+            let way = sheets.seeds[other] + self.period.translation(shift) - seed;
+            Near { cell: other, shift, way }
+        });
+        let near: Vec<Near> = near.collect();
+        let mut polyhedron = Polyhedron::cube(CUBE * spacing);
+        for (at, Near { cell: other, way, .. }) in near.iter().enumerate() {
+            let distance = way.length();
+            let square = way.length_squared() + own - sheets.weights[*other];
+            // A cut that only grazes corners takes nothing away.
+            let half_space = HalfSpace {
+                normal: way.normalize_or_zero(),
+                offset: 0.5 * square / distance + 1e-12 * spacing,
+                behind: Behind::Cell(checked_u32(at)),
+            };
+            if half_space.offset * half_space.offset < polyhedron.radius_squared() || half_space.offset < 0.0
+            {
+                polyhedron.cut(half_space).map_err(|_| NoLayers::Seeds { place: seed })?;
+            }
+        }
+        Ok(Body { polyhedron, near })
+    }
+}
+
+/// A corner of what the walls leave of a face, seen from the seed.
+pub(super) struct Kept {
+    pub(super) place: DVec3,
+    /// The wall that it lies on.
+    pub(super) wall: Option<WallSide>,
+    /// The ends of the polyhedron's edge that it lies on; twice the same for a corner of the polyhedron.
+    pub(super) edge: [u32; 2],
+}
+
+/// Tells on which side of the walls places lie; between parallel walls by the level function of the middle surface where
+/// that decides, for the distance takes a search.
+pub(super) struct Sight<'a> {
+    pub(super) gap: &'a Gap,
+    /// The range of the middle surface's level function on each wall, with a margin.
+    on_wall: Option<[[f64; 2]; 2]>,
+}
+
+/// Lines per axis of the samples of that range, and its margin as a part of it.
+const SIGHT_LINES: usize = 30;
+const SIGHT_MARGIN: f64 = 0.1;
+
+impl<'a> Sight<'a> {
+    pub(super) fn new(gap: &'a Gap) -> Self {
+        let middle = gap.middle();
+        let searches = gap.kind() == GapKind::Parallel && !middle.is_distance();
+        let on_wall = searches.then(|| {
+            let samples = SurfaceSamples::new(middle.as_ref(), 0.0, SIGHT_LINES);
+            gap.walls().each_ref().map(|wall| {
+                let value = |p: DVec3| middle.value(p + wall.level * middle.normal(p));
+                let values = samples.points().iter().map(|point| value(point.position));
+                let start = (f64::INFINITY, f64::NEG_INFINITY);
+                let (low, high) = values.fold(start, |(l, h), x| (l.min(x), h.max(x)));
+                let margin = SIGHT_MARGIN * (high - low);
+                [low - margin, high + margin]
+            })
+        });
+        Self { gap, on_wall }
+    }
+
+    /// The wall beyond which each corner of a body lies; none inside the gap.
+    pub(super) fn beyond(&self, body: &Polyhedron, seed: DVec3) -> Vec<Option<WallSide>> {
+        let places = body.corners.iter().map(|&corner| seed + corner);
+        places.map(|p| WallSide::BOTH.into_iter().find(|&side| self.is_beyond(p, side))).collect()
+    }
+
+    fn is_beyond(&self, p: DVec3, side: WallSide) -> bool {
+        // Upwards out of the upper wall, downwards out of the lower one.
+        let sign = if side == WallSide::Upper { 1.0 } else { -1.0 };
+        if let Some(on_wall) = self.on_wall {
+            let level = self.gap.middle().value(p);
+            let [low, high] = on_wall[side as usize];
+            if !(low..=high).contains(&level) {
+                return sign * (level - low) > 0.0;
+            }
+        }
+        sign * self.gap.wall(side).value(p) > 0.0
+    }
+}
+
 /// The part of a face inside the gap: corners that stay, and the places where its edges meet the walls.
-fn within_walls(gap: &Gap, body: &Polyhedron, face: &Face, seed: DVec3) -> Vec<(DVec3, Option<WallSide>)> {
+pub(super) fn within_walls(
+    gap: &Gap,
+    body: &Polyhedron,
+    face: &Face,
+    outside: &[Option<WallSide>],
+    seed: DVec3,
+) -> Vec<Kept> {
     let mut kept = Vec::with_capacity(face.corners.len() + 2);
-    let outside = |p: DVec3| match (gap.wall(WallSide::Lower).value(p), gap.wall(WallSide::Upper).value(p)) {
-        (below, _) if below < 0.0 => Some(WallSide::Lower),
-        (_, above) if above > 0.0 => Some(WallSide::Upper),
-        _ => None,
-    };
     let count = face.corners.len();
     for at in 0..count {
-        let place = |at: usize| seed + body.corners[face.corners[at % count] as usize];
-        let (from, to) = (place(at), place(at + 1));
-        let (leaves, enters) = (outside(from), outside(to));
+        let edge = [face.corners[at], face.corners[(at + 1) % count]];
+        let [from, to] = edge.map(|corner| seed + body.corners[corner as usize]);
+        let [leaves, enters] = edge.map(|corner| outside[corner as usize]);
         if leaves.is_none() {
-            kept.push((from, None));
+            kept.push(Kept { place: from - seed, wall: None, edge: [edge[0]; 2] });
         }
         for side in [leaves, enters].into_iter().flatten() {
             if leaves != enters {
                 let wall = gap.wall(side);
-                kept.push((wall.field.crossing(from, to, wall.level), Some(side)));
+                let place = wall.field.crossing(from, to, wall.level) - seed;
+                kept.push(Kept { place, wall: Some(side), edge });
             }
         }
     }

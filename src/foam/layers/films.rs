@@ -1,7 +1,8 @@
 //! The film complex of a division: each polygon as curved quadrilaterals round its middle.
 //!
 //! A film with `k` corners is cut into `k` quadrilaterals, from each corner to the middles of the two sides that meet there
-//! and to the middle of the film, of `fineness × fineness` biquadratic elements each. Borders are shared by their films;
+//! and to the middle of the film, of `fineness × fineness` biquadratic elements each. The coarsest films, of fineness 0, are
+//! `k` quadratic triangles from each whole side to the middle: a third of the unknowns, a tenth of the work. Borders are shared by their films;
 //! their nodes are slaved to the two corners, and those inside a film to all nodes round it, by mean value coordinates
 //! (M. S. Floater, "Mean value coordinates", CAGD 20, 2003), so that a film goes with its borders and its wall. After a change
 //! of topology, borders and films that were not touched keep their places.
@@ -40,7 +41,8 @@ pub struct LayerFilms {
     inner: Vec<Range<usize>>,
 }
 
-/// Builds the complex of `division` with `fineness` elements on each half side, from plane films.
+/// Builds the complex of `division` with `fineness` elements on each half side, or one on each whole side for 0, from plane
+/// films.
 #[must_use]
 pub fn layer_films(division: &Division, gap: &Gap, fineness: usize) -> LayerFilms {
     build(division, gap, fineness, None)
@@ -132,6 +134,7 @@ struct SideNodes {
 struct Builder<'a> {
     division: &'a Division,
     gap: &'a Gap,
+    fineness: usize,
     /// Nodes along a half side, less one.
     half: usize,
     nodes: IndexVec<NodeId, Node>,
@@ -154,7 +157,8 @@ impl<'a> Builder<'a> {
             .collect();
         let places = division.corners.iter().map(|corner| corner.place).collect();
         let (sides, kept) = (BTreeMap::new(), Vec::new());
-        Self { division, gap, half: 2 * fineness, nodes, places, sides, before, kept }
+        let half = (2 * fineness).max(1);
+        Self { division, gap, fineness, half, nodes, places, sides, before, kept }
     }
 
     fn add(&mut self, node: Node, place: DVec3) -> NodeId {
@@ -218,7 +222,10 @@ impl<'a> Builder<'a> {
             .collect();
         let patch = Patch::new(self, &sides);
         let first = self.nodes.len();
-        let elements = self.quadrilaterals(&sides, &patch);
+        let elements = match self.fineness {
+            0 => self.triangles(&sides, &patch),
+            _ => self.quadrilaterals(&sides, &patch),
+        };
         let side = |cell: usize, shift| RegionImage { region: RegionId::from_index(cell), shift };
         let film = Film {
             front: side(polygon.neighbour, polygon.shift),
@@ -227,6 +234,19 @@ impl<'a> Builder<'a> {
             elements,
         };
         (film, first..self.nodes.len())
+    }
+
+    /// One for each side, with its third corner in the middle.
+    fn triangles(&mut self, sides: &[Vec<NodeImage>], patch: &Patch) -> Vec<Element> {
+        let count = sides.len();
+        let centre = self.inner(patch, patch.centre);
+        let spokes: Vec<NodeImage> = (0..count)
+            .map(|k| self.inner(patch, patch.at(k * 2 * self.half).lerp(patch.centre, 0.5)))
+            .collect();
+        let nodes = |k: usize| {
+            vec![sides[k][0], sides[k][2], centre, sides[k][1], spokes[(k + 1) % count], spokes[k]]
+        };
+        (0..count).map(|k| Element { shape: Shape::Tri6, nodes: nodes(k) }).collect()
     }
 
     fn quadrilaterals(&mut self, sides: &[Vec<NodeImage>], patch: &Patch) -> Vec<Element> {

@@ -6,17 +6,23 @@
 //! | step | file |
 //! |---|---|
 //! | two sheets of seeds: rhombic, Tóth's, or annealed on both sides | `arrangement.rs` |
-//! | their Voronoi cells, cut off by the walls; corners, polygons | `division.rs` |
+//! | annealed sheets settle together: plane films between power cells, of least area at equal volumes | `settle.rs`, `plane_films.rs` |
+//! | their power cells, cut off by the walls; corners, polygons | `division.rs` |
 //! | the film complex: each polygon as curved quadrilaterals round its middle | `films.rs` |
 //! | the descent to least energy at equal volumes | `relax.rs` |
-//! | borders and films that vanish: changes of topology | `flip.rs` |
+//! | borders and films that vanish: changes of topology | `flip/` |
 //! | ends with plane films: energies by formula | `ends.rs` |
 //! | side counts; angles at corners | `figures.rs` |
 //! | how the defects of the two layers sit to each other | `companions.rs` |
 //!
+//! Each layer fills its side of the gap up to the middle surface, in equal cells. Annealed layers that are less high than half
+//! a cell's width are refused: there films between the layers reach the walls, and the foam of least energy is no foam of two
+//! layers.
+//!
 //! Not promised: balance. A change that would take a cell to the other wall, away from its own, or to a second film with a
 //! neighbour is not made, nor one at corners where more than four cells meet, as in the bees' arrangement; a foam that needs it
-//! ends as stalled, with the borders that vanish. Few cells on a sphere do, and layers much flatter than a cell is wide.
+//! ends as stalled, with the borders that vanish. Between curved walls, where one wall's cells are much narrower than the
+//! other's, short borders hold up the descent.
 //!
 //! Sources: L. Fejes Tóth, "What the bees know and what they do not know", Bull. Amer. Math. Soc. 70 (1964); D. Weaire and
 //! R. Phelan, "Optimal design of honeycombs", Nature 367 (1994), who made both arrangements in foam between glass plates.
@@ -28,7 +34,9 @@ mod ends;
 mod figures;
 mod films;
 mod flip;
+mod plane_films;
 mod relax;
+mod settle;
 
 pub use arrangement::{Arrangement, Sheets, sheets};
 pub use companions::{Chance, Charged, Companions, Compared, charged, companions};
@@ -81,6 +89,28 @@ pub enum NoLayers {
     Through {
         /// How many.
         cells: usize,
+    },
+    /// The layers are too flat.
+    #[error(
+        "the layers are too flat: where the gap is narrowest a cell would be {flattest:.2} of its width high, and films between the layers would reach the walls; ask for {needed:.0} cells on each wall or more, or widen the gap"
+    )]
+    Flat {
+        /// The least height of a cell over its width.
+        flattest: f64,
+        /// Cells on each wall that would do.
+        needed: f64,
+    },
+    /// More cells than can be relaxed.
+    #[error(
+        "{cells} cells on each wall are too many: Newton's matrix for two layers takes minutes a step from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
+    )]
+    Many {
+        /// Asked for.
+        cells: usize,
+        /// The most.
+        most: usize,
+        /// The width of so many cells.
+        width: f64,
     },
     /// The cells on a wall do not cover it once.
     #[error(

@@ -90,7 +90,7 @@ const MOST_SPREADS: usize = 12;
 const WEARINESS: f64 = 0.6;
 
 /// The coarsest films.
-const FIRST_FINENESS: usize = 1;
+const FIRST_FINENESS: usize = 0;
 /// The force at which the first descent, on the coarsest films, ends: topology has settled by then.
 const FIRST_TOLERANCE: f64 = 1e-3;
 
@@ -132,7 +132,7 @@ pub fn relaxed(
         let vanish = !shrinking.sides.is_empty();
         let flipped = goes_on && vanish && settings.changes_topology && run.flip(&shrinking);
         let spread = goes_on && !flipped && stuck && run.spread();
-        let refined = goes_on && !flipped && !spread && !stuck && run.refine();
+        let refined = goes_on && !flipped && !spread && run.refine();
         if !(flipped || spread || refined) {
             let descended = Descended { steps, ..descended };
             return Ok(run.end(&descent, descended, first_energy));
@@ -173,8 +173,9 @@ type Lengths = BTreeMap<Side, f64>;
 
 impl Run<'_> {
     fn descent(&self, pressures: IndexVec<RegionId, f64>) -> Result<Descent, NoLayers> {
-        let cells = self.division.seeds.len();
-        let wanted = IndexVec::from_elem(1.0 / as_f64(cells), cells);
+        let Division { seeds, volumes, .. } = &self.division;
+        let wanted = (0..seeds.len()).map(|cell| volumes[usize::from(!self.division.is_lower(cell))]);
+        let wanted = wanted.collect();
         Ok(Descent::new(self.films.complex.clone(), wanted, self.films.places.clone(), pressures)?)
     }
 
@@ -340,11 +341,14 @@ impl Layers {
         &self.films.places
     }
 
-    /// The relative spread of the volumes round their mean.
+    /// The relative spread of the volumes round their layer's mean.
     #[must_use]
     pub fn volume_spread(&self) -> f64 {
-        let count = as_f64(self.volumes.len());
-        let mean = self.volumes.iter().sum::<f64>() / count;
-        (self.volumes.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>() / count).sqrt()
+        let (lower, upper) = self.volumes.as_slice().split_at(self.division.lower);
+        let squares = |layer: &[f64]| {
+            let mean = layer.iter().sum::<f64>() / as_f64(layer.len());
+            layer.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>()
+        };
+        ((squares(lower) + squares(upper)) / as_f64(self.volumes.len())).sqrt()
     }
 }

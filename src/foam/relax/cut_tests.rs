@@ -118,9 +118,9 @@ fn pieces_of_p_settle_and_keep_every_law() -> Tested {
             // The walls' patches reach 1e-9 with cells of this size, as in closed foams.
             let filled = volume(state, &gap) / (share * VOLUME_OF_P) - 1.0;
             assert!(filled.abs() < 1e-8, "{space}, seed {seed}: {filled:e}");
-            // An element's end turns by up to h² of what the film turns.
+            // With two elements along a film its end misses the right angle by up to two degrees.
             let angle = worst_angle(state);
-            assert!(angle < 0.02, "{space}, seed {seed}: {angle}");
+            assert!(angle < 0.035, "{space}, seed {seed}: {angle}");
             let pattern =
                 pattern_of_state(state, &gap, PatternPlace::Middle).map_err(|d| format!("{d:?}"))?;
             for (cell, seen) in state.network.cells().zip(&pattern.cells) {
@@ -179,8 +179,9 @@ fn with_its_mirror_image_a_half_foam_is_a_periodic_foam_of_twice_the_energy_in_b
     let descended = descent.descend(&settings, &mut |_| ControlFlow::Continue(()))?;
     let total: f64 = descent.volumes().iter().sum();
     assert!((total / VOLUME_OF_P - 1.0).abs() < 1e-9, "{total}");
-    // Where its cells end at planes the half foam's volumes come from other origins: 1e-9 of the fans' quadrature.
-    assert!(descended.residuals.force < 1e-9 && descended.residuals.volume < 1e-8, "{descended:?}");
+    // Forces along films are those of the mesh; taking the films' normals anew turns 1e-9 of them into the balance. What the
+    // energy still lacks goes with the square.
+    assert!(descended.residuals.force < 1e-8 && descended.residuals.volume < 1e-11, "{descended:?}");
     Ok(())
 }
 

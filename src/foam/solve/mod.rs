@@ -81,13 +81,17 @@ pub struct Step {
     pub shift: f64,
 }
 
-/// The stiffening starts at this part of the tension and grows tenfold: film Hessians have diagonals of the order of γ.
+/// The stiffening starts at this part of the tension and grows fourfold: film Hessians have diagonals of the order of γ. A step
+/// grows along a falling direction by about its curvature over what is left of the stiffening: one far too stiff creeps.
 const FIRST_SHIFT: f64 = 1e-3;
+const SHIFT_GROWTH: f64 = 4.0;
+/// A Hessian that is just positive gives steps as wild as one that is not: so much more is added then.
+const MARGIN: f64 = 2.0;
 /// The part of a cell's compliance that is taken off its pressure's diagonal. With 1e-5 refinement is slow; below 1e-12 the
 /// factors are too large for it to help.
 const SOFTENING: f64 = 1e-9;
 /// Stiffenings before giving up: at 10⁵ γ a step is no longer a step.
-const SHIFTS: i32 = 9;
+const SHIFTS: i32 = 15;
 
 impl System {
     /// The system of `complex` with frames taken at `places`.
@@ -263,15 +267,15 @@ impl System {
             let extra =
                 factored.as_ref().map_or(1, |f| (f.negative + inner).saturating_sub(self.layout.pressures));
             unstable.get_or_insert(extra);
-            // A Hessian that is just positive gives steps as wild as one that is not: one stiffening more.
-            let sound = extra == 0 && (attempt == 0 || std::mem::replace(&mut stiff, true));
+            let found = extra == 0 && attempt > 0 && !std::mem::replace(&mut stiff, true);
+            let sound = extra == 0 && !found;
             if let Ok(factored) = factored
                 && sound
                 && accept(&factored, &films)
             {
                 return Ok((unstable.unwrap_or(0), shift));
             }
-            shift = (10.0 * shift).max(FIRST_SHIFT);
+            shift = (shift * if found { MARGIN } else { SHIFT_GROWTH }).max(FIRST_SHIFT);
         }
         Err(FactorError::Singular { unknowns: self.layout.unknowns })
     }
