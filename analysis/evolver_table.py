@@ -75,6 +75,17 @@ CONVERGED = [
     ("TorusTop.fe", 0.0792683805),
     ("TorusInner.fe", 0.0793193176),
 ]
+# Bubbles that are brought to rest level by level: what comes before, and by which steps. The last one's volume as printed is
+# many times that of its elements, and its Hessian is indefinite, so that full Newton steps destroy it in Surface Evolver.
+SAME_MESH = [
+    ("Sphere.fe", "", "hessian"),
+    ("Torus.fe", "", "hessian"),
+    ("TorusOuter.fe", "", "hessian"),
+    ("TorusTop.fe", "", "hessian"),
+    ("TorusInner.fe", "", "hessian"),
+    ("PsurfaceOriented.fe", "body[1].target := 0.0005; g 20; ", "hessian_seek"),
+]
+LEVEL_COUNT = 5
 # The relaxed foams between plates: linear as their datafiles are, and quadratic.
 PLATES = [("foams/plates_64.fe", 61.5290265), ("foams/plates_256.fe", 245.927057)]
 
@@ -120,7 +131,12 @@ def run_evolver(program, file, commands):
 def run_combwright(program, file, commands, as_printed):
     options = ["--as-printed"] if as_printed else []
     with tempfile.TemporaryDirectory() as folder:
-        return timed([program, "evolver", "run", str(file), "-c", "quiet on", "-c", commands, "-c", REPORT, "-o", folder, *options])
+        return run_in(program, file, commands, folder, options)
+
+
+def run_in(program, file, commands, folder, options=()):
+    """Runs combwright with what it writes in a folder."""
+    return timed([program, "evolver", "run", str(file), "-c", "quiet on", "-c", commands, "-c", REPORT, "-o", str(folder), *options])
 
 
 def energies(text):
@@ -144,22 +160,30 @@ def converged(arguments, file, reference):
               f"{limit / reference - 1:+.1e}  {result[1]:.2f} s", flush=True)
 
 
-def same_mesh(arguments, file, commands):
-    """The energy at rest on one mesh: combwright's, dumped and brought to rest by both programs."""
-    rest = "hessian; hessian; hessian"
+def same_mesh(arguments, file, first, step):
+    """The energy at rest of linear elements, level by level: combwright's, and Surface Evolver's on the same mesh, as read and
+    brought to rest."""
+    rest = "; ".join([step] * 3)
+    level = "r; u; V; g 30; hessian_seek; hessian_seek; " + rest
     with tempfile.TemporaryDirectory() as folder:
-        ours = timed([arguments.combwright, "evolver", "run", str(file), "-c", "quiet on", "-c", f"{commands}; {rest}",
-                      "-c", REPORT, "-o", folder])
-        dumped = Path(folder) / "final.fe"
-        if not dumped.exists():
-            print(f"{file.name:16} {figures(ours[0])[2]}", flush=True)
-            return
-        at_once = run_evolver(arguments.evolver, dumped, "")
-        at_rest = run_evolver(arguments.evolver, dumped, "\n".join(rest.split("; ")))
-    values = [energies(text)[-1] for text, _ in (ours, at_once, at_rest) if energies(text)]
-    if len(values) == 3:
-        print(f"{file.name:16} {values[0]:.14g} at once {values[1] / values[0] - 1:+.1e} at rest {values[2] / values[0] - 1:+.1e}",
-              flush=True)
+        commands = first + "".join(f'{level}; {REPORT} dump "level{at}.fe"; ' for at in range(1, LEVEL_COUNT + 1))
+        ours = run_in(arguments.combwright, file, commands, folder)
+        dumps = [Path(folder) / f"level{at}.fe" for at in range(1, LEVEL_COUNT + 1)]
+        if len(energies(ours[0])) < LEVEL_COUNT or not all(dump.exists() for dump in dumps):
+            print(f"{file.name:20} {figures(ours[0])[2]}", flush=True)
+        for dump, here in zip(dumps, energies(ours[0])):
+            found = energies(run_evolver(arguments.evolver, dump, REPORT + "\n" + "\n".join(rest.split("; ")))[0])
+            facets = len(re.findall(r"^\s*\d+", dump.read_text().lower().split("faces", 1)[1].split("bodies")[0], re.M))
+            if len(found) == 2:
+                print(f"{file.name:20} {facets:6} facets  {here:.14g}  at once {found[0] / here - 1:+.1e}  "
+                      f"at rest {found[1] / here - 1:+.1e}", flush=True)
+
+
+def levels(arguments):
+    print("\nlinear elements at rest, level by level, Surface Evolver relative to combwright on the same mesh")
+    for name, first, step in SAME_MESH:
+        if not arguments.only or arguments.only in name:
+            same_mesh(arguments, arguments.paper / name, first, step)
 
 
 def plates(arguments, file, reference):
@@ -193,8 +217,12 @@ def main():
     parser.add_argument("--combwright", default="target/debug/combwright")
     parser.add_argument("--paper", type=Path, default=Path("../shared/fe"))
     parser.add_argument("--only", help="only files whose name holds this")
+    parser.add_argument("--levels", action="store_true", help="only linear elements at rest, level by level")
     parser.add_argument("--markdown", action="store_true", help="a table for the documentation")
     arguments = parser.parse_args()
+    if arguments.levels:
+        levels(arguments)
+        return
     folder = examples()
     cases = [(folder / name, commands) for name, commands in CASES] if folder else []
     cases += [(arguments.paper / name, commands) for name, commands in PAPER]
@@ -208,10 +236,7 @@ def main():
     print("\nconverged with quadratic elements, five levels")
     for name, reference in CONVERGED:
         converged(arguments, arguments.paper / name, reference)
-    print("\nat rest on one mesh, Surface Evolver relative to combwright")
-    for name in ("Sphere.fe", "TorusOuter.fe", "TorusTop.fe", "TorusInner.fe"):
-        for levels in (1, 2):
-            same_mesh(arguments, arguments.paper / name, "; ".join(["r; u; V; g 30; hessian_seek"] * levels))
+    levels(arguments)
     print("\nfoams between plates")
     for name, reference in PLATES:
         plates(arguments, arguments.paper / name, reference)

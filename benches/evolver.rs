@@ -58,7 +58,7 @@ fn speed() {
     }
 }
 
-const WORDS: [&str; 60] = [
+const WORDS: [&str; 86] = [
     "vertices",
     "edges",
     "faces",
@@ -119,7 +119,44 @@ const WORDS: [&str; 60] = [
     "\n",
     "volume",
     "torus",
+    "o",
+    "O",
+    "pop",
+    "t1_edgeswap",
+    "delete",
+    "slide",
+    "t 0.3",
+    "w 0.2",
+    "refine",
+    "define zz real[2][3]",
+    "zz",
+    "zz[1][2]",
+    "{{1,2},{3,4}}",
+    "real",
+    "integer",
+    "local nn",
+    "nn",
+    "return",
+    "procedure p1(real aa) { print aa }",
+    "p1(",
+    "function real f1(real bb) {",
+    "f1(",
+    "++",
+    "--",
+    "string",
+    "space_dimension 2",
 ];
+
+/// Commands that mutations change, beside the elements of the file.
+const MUTATED: &str = "\
+r; g 2; u; V; printf \"%g\", total_energy; hessian; define zz real[3][2]; zz[2][1] := 4; zz := 2*zz; print zz
+function real ff(real aa) { local bb; bb := aa*2; if bb > 3 then return 1; return ff(bb) }
+procedure pp(integer nn) { print ff(nn); for ( ii := 1; ii < nn; ii++ ) { zz[ii][1] += ii } }
+pp(3); delete edge[5]; o; pop vertex; refine edge where length > 0.4; t 0.2
+";
+
+/// What mutations put in.
+const LETTERS: &[u8] = b" 0123456789-+.*/()[]{};:=,\nabcdefgvx";
 
 /// Random bytes, random words, and mutations of a sound file; a session runs what can be read.
 fn fuzz(seconds: u64) {
@@ -139,11 +176,10 @@ fn fuzz(seconds: u64) {
                 .collect::<Vec<_>>()
                 .join(" "),
             _ => {
-                let mut bytes =
-                    format!("{CUBE}read\nr; g 2; u; V; printf \"%g\", total_energy; hessian\n").into_bytes();
+                let mut bytes = format!("{CUBE}read\n{MUTATED}").into_bytes();
                 for _ in 0..random.random_range(1..8) {
                     let at = random.random_range(0..bytes.len());
-                    bytes[at] = b" 0123456789-+.*/()[]{};:=\nabcdefgvx"[random.random_range(0..36)];
+                    bytes[at] = LETTERS[random.random_range(0..LETTERS.len())];
                 }
                 String::from_utf8_lossy(&bytes).into_owned()
             }

@@ -114,7 +114,7 @@ fn growth() -> Result<(), Box<dyn Error>> {
     for cells in [64, 128, 256, 512] {
         let seeds = SeedSettings::new(cells, 1);
         let (until, started) = timed(|| start(&gap, &domain, &seeds, &mut |_| ControlFlow::Continue(())));
-        let network = started?.network.ok_or("no network")?;
+        let network = started?.network;
         let settings = RelaxSettings::default();
         let (seconds, relaxed) =
             timed(|| relax(network, &gap, &settings, &mut |_| ControlFlow::Continue(())));

@@ -98,6 +98,13 @@ fn bad_input_gets_one_clear_message_and_no_output() -> Tested {
         ("--surface plane --periods 8,8 --height 1 --delta 0.2", "--delta belongs to"),
         ("--cells 1 --hot NaN --cold 2 --runs 0", "faults in the arguments"),
         ("--surface klein-bottle", "possible values"),
+        ("--surface sphere --radii 1,1.1 --open-faces walls", "no open faces"),
+        ("--surface gyroid --open-faces walls", "no planes of mirror symmetry"),
+        // Strips from wall to wall.
+        (
+            "--surface plane --periods 8,1 --height 0.5 --cells 4 --open-faces walls --sweeps 20",
+            "too few cells",
+        ),
         // Three cells cannot cover the P-surface, whatever the seed.
         ("--cells 3 --sweeps 20", "no sound partition"),
     ] {
@@ -223,5 +230,53 @@ fn a_checkpoint_that_is_none_is_refused() -> Tested {
     }
     let ended = foam(home.path(), "--resume nowhere/checkpoint")?;
     assert_eq!(ended.status.code(), Some(2));
+    Ok(())
+}
+
+/// The default of a recipe: as much of the gap as is printed, with plane walls at its open faces.
+#[test]
+fn a_recipe_is_filled_as_far_as_it_is_printed_and_cells_at_its_faces_are_cut() -> Tested {
+    let home = tempfile::tempdir()?;
+    let recipe = home.path().join("half.toml");
+    fs::write(
+        &recipe,
+        "[cell]\nperiod = 50.0\npart = \"half\"\n[gap]\nshape = \"level-set\"\ndelta = 0.2\n",
+    )?;
+    let of = |faces: &str| -> Result<(Value, String), Box<dyn Error>> {
+        let arguments = format!("--recipe {} -n 36 --sweeps 100 {faces}", recipe.display());
+        let ended = foam(home.path(), &arguments)?;
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        let out = home.path().join("out");
+        Ok((json(&out.join("summary.json"))?, fs::read_to_string(out.join("cells.csv"))?))
+    };
+    let (walls, cells) = of("")?;
+    // Half of the volume of |Φ| < 0.2.
+    let volume = walls["gap_volume"].as_f64().ok_or("no volume")? / 50.0_f64.powi(3);
+    assert!((volume / 0.057_079_498_276_435 - 1.0).abs() < 1e-8, "{volume}");
+    let cut = cells.lines().filter(|line| line.contains(",cut,")).count();
+    assert!((10..36).contains(&cut) && walls["cut_cells"] == cut, "{cut} in {cells}");
+    assert_eq!(cells.lines().filter(|line| line.contains(",complete,")).count(), 36 - cut);
+    let pattern = json(&home.path().join("out/pattern.json"))?;
+    assert_eq!(pattern["surroundings"], "open");
+    // Periodic along x and y, fewer cells end at planes.
+    let (periodic, _) = of("--open-faces periodic")?;
+    assert!(periodic["cut_cells"].as_u64().ok_or("no count")? < cut as u64);
+    assert!(periodic["energy"].as_f64() > walls["energy"].as_f64());
+    Ok(())
+}
+
+#[test]
+fn annealing_gives_the_same_files_with_any_number_of_threads() -> Tested {
+    let written = |jobs: &str| -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
+        let home = tempfile::tempdir()?;
+        let arguments = "--surface plane --periods 5,5 --height 0.4 -n 20 --sweeps 30 --anneal 12";
+        let ended = foam(home.path(), &format!("{arguments} --open-faces walls -j {jobs}"))?;
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        ["cells.csv", "pattern.json", "films.vtp", "summary.json"]
+            .iter()
+            .map(|name| Ok(fs::read(home.path().join("out").join(name))?))
+            .collect()
+    };
+    assert_eq!(written("1")?, written("2")?);
     Ok(())
 }

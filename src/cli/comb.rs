@@ -10,6 +10,7 @@ use crate::{
     units::Mm,
 };
 use anyhow::{Context, anyhow};
+use indicatif::ProgressBar;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::{
@@ -21,6 +22,9 @@ use std::{
 
 /// Extensions of the files that are taken from a folder.
 const EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
+
+/// The corrections of a photograph in its folder.
+const CORRECTIONS: &str = "corrections.json";
 
 /// What was typed after `comb`.
 #[derive(Debug, clap::Args)]
@@ -51,9 +55,21 @@ pub(super) struct CombArguments {
     /// The median pitch of the cells (5.3mm), or the size of a pixel (0.06mm/px)
     #[arg(long, value_name = "LENGTH")]
     scale: Option<ScaleArgument>,
-    /// Corrections by hand: a corrections.json, or a cells.csv that was edited
-    #[arg(long, value_name = "FILE")]
+    /// Corrections by hand: a corrections.json, or a cells.csv that was edited (rows removed, added, other sides or status)
+    ///
+    /// What was corrected is kept as corrections.json in the photograph's folder and holds for every later run into it. A
+    /// corrections.json is written so, points in pixels, any number of entries, of which the later holds:
+    ///
+    /// {"schema": "combwright.corrections/1", "corrections": [
+    ///   {"add": {"at": [310, 95]}}, {"remove": {"at": [200, 40]}},
+    ///   {"join": {"at": [50, 60], "with": [80, 60]}}, {"split": {"at": [400, 300], "into": [[390, 300], [410, 300]]}},
+    ///   {"sides": {"at": [120, 80], "sides": 5}}, {"status": {"at": [140, 80], "status": "uncertain"}},
+    ///   {"mask": {"polygon": [[0, 0], [90, 0], [90, 70]]}}]}
+    #[arg(long, value_name = "FILE", verbatim_doc_comment)]
     corrections: Option<PathBuf>,
+    /// Read anew, without the corrections.json that the photograph's folder holds
+    #[arg(long, conflicts_with = "corrections")]
+    no_corrections: bool,
     /// Threads; all cores if none is given
     #[arg(short, long, value_name = "COUNT")]
     jobs: Option<usize>,
@@ -111,6 +127,7 @@ struct Run<'a> {
     mask: Option<&'a Path>,
     scale_mm_per_px: Option<f64>,
     corrections: Option<&'a Corrections>,
+    cells_crc32: u32,
     seconds: f64,
 }
 
@@ -138,7 +155,7 @@ fn read_all(arguments: &CombArguments) -> Result<(), CliError> {
     let bar = progress::steps(photos.len() as u64);
     let results: Vec<Result<CombSummary, CliError>> = pool.install(|| {
         let one = |(name, path): &(String, PathBuf)| {
-            let result = read_one(arguments, name, path);
+            let result = read_one(arguments, name, path, &bar);
             bar.inc(1);
             result
         };
@@ -187,7 +204,12 @@ fn report(
     }
 }
 
-fn read_one(arguments: &CombArguments, name: &str, path: &Path) -> Result<CombSummary, CliError> {
+fn read_one(
+    arguments: &CombArguments,
+    name: &str,
+    path: &Path,
+    bar: &ProgressBar,
+) -> Result<CombSummary, CliError> {
     let start = Instant::now();
     let shown = path.display().to_string();
     let photo = Photo::open(path).map_err(CliError::mistake)?;
@@ -197,14 +219,20 @@ fn read_one(arguments: &CombArguments, name: &str, path: &Path) -> Result<CombSu
         mask: arguments.mask.as_deref().map(open_mask).transpose()?,
         corrections: Corrections::default(),
     };
-    let comb = read_corrected(&photo, &mut settings, arguments.corrections.as_deref())
-        .map_err(|e| in_photo(e, &shown))?;
+    let target = arguments.output.join(name);
+    let kept = target.join(CORRECTIONS);
+    let of_folder = (!arguments.no_corrections && kept.is_file()).then_some(kept.as_path());
+    let corrections = arguments.corrections.as_deref().or(of_folder);
+    let comb = read_corrected(&photo, &mut settings, corrections).map_err(|e| in_photo(e, &shown))?;
+    if let (None, Some(kept)) = (&arguments.corrections, of_folder) {
+        bar.suspend(|| eprintln!("{}", applied(kept, &settings.corrections)));
+    }
     let scale = arguments.scale.map(|s| s.0);
     let summary = output::summary(name, &comb, scale);
-    let mut folder = OutputFolder::begin(arguments.output.join(name))?;
+    let mut folder = OutputFolder::begin(&target)?;
     output::write(&mut folder, &comb, &photo, &summary).map_err(CliError::failure)?;
     if arguments.corrections.is_some() {
-        folder.write_json("corrections.json", &settings.corrections)?;
+        folder.write_json(CORRECTIONS, &settings.corrections)?;
     }
     let run = Run {
         schema: "combwright.run/1",
@@ -214,15 +242,34 @@ fn read_one(arguments: &CombArguments, name: &str, path: &Path) -> Result<CombSu
         region: arguments.roi.map(|r| [r.0.left, r.0.top, r.0.width, r.0.height]),
         mask: arguments.mask.as_deref(),
         scale_mm_per_px: summary.mm_per_px,
-        corrections: arguments.corrections.is_some().then_some(&settings.corrections),
+        corrections: corrections.is_some().then_some(&settings.corrections),
+        cells_crc32: folder.checksum(output::CELLS)?,
         seconds: start.elapsed().as_secs_f64(),
     };
     folder.write_json("run.json", &run)?;
+    if let Some(copy) = folder.keep_other(output::CELLS, written_before(&target))? {
+        bar.suspend(|| eprintln!("note: the folder's {} was edited; it is kept as {copy}", output::CELLS));
+    }
     folder.commit()?;
     Ok(summary)
 }
 
-/// Reads a photograph with the corrections of a file. A table is compared with what is read without it first.
+/// The checksum of the table that the last run into a folder has written.
+fn written_before(folder: &Path) -> Option<u32> {
+    let run: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("run.json")).ok()?).ok()?;
+    run["cells_crc32"].as_u64().and_then(|sum| u32::try_from(sum).ok())
+}
+
+fn applied(kept: &Path, corrections: &Corrections) -> String {
+    format!(
+        "note: {} corrections of {} hold; --no-corrections reads without them",
+        corrections.corrections.len(),
+        kept.display()
+    )
+}
+
+/// Reads a photograph with the corrections of a file. A table is compared with what is read without it first, but with the
+/// corrections beside it, of which masks and joined cells leave no trace in it.
 fn read_corrected(
     photo: &Photo,
     settings: &mut Settings,
@@ -237,7 +284,16 @@ fn read_corrected(
     let named = |e: anyhow::Error| CliError::Mistake(e.context(path.display().to_string()));
     settings.corrections = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
         let rows = comb::read_cells(text.as_bytes()).map_err(|e| named(e.into()))?;
-        Corrections::from_table(&rows, &comb::read(photo, settings).map_err(CliError::mistake)?)
+        if rows.is_empty() {
+            return Err(named(anyhow!("the table has no cells; to hide all of a photograph, leave it out")));
+        }
+        let beside = path.with_file_name(CORRECTIONS);
+        if beside.is_file() {
+            let text = fs::read_to_string(&beside).map_err(|e| named(e.into()))?;
+            settings.corrections = Corrections::from_json(&text).map_err(|e| named(e.into()))?;
+        }
+        let before = comb::read(photo, settings).map_err(CliError::mistake)?;
+        settings.corrections.clone().and(Corrections::from_table(&rows, &before))
     } else {
         Corrections::from_json(&text).map_err(|e| named(e.into()))?
     };

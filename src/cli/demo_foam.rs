@@ -52,11 +52,9 @@ pub(super) fn make(
     for step in 0..wanted as u64 + SPARE {
         let settings = settings(space, SeedSettings::new(cells, seed.wrapping_add(step)));
         let start = foam_run::started(&settings, gap, bar)?;
-        let network =
-            start.network.ok_or_else(|| CliError::failure(anyhow!("the partition gave no network")))?;
         let job = Job::new(&settings, start.seeds.psi6);
         let mut keeper = Keeper::new(&job, bar, None, Vec::new());
-        let relaxed = keeper.relax(Begin::Network(network), gap)?;
+        let relaxed = keeper.relax(Begin::Network(start.network), gap)?;
         let made = Made::new(&job, gap, relaxed, keeper.record)?;
         if !matches!(made.figures.ended, Stop::Converged { .. }) {
             unsettled += 1;

@@ -2,6 +2,7 @@
 
 use super::CliError;
 use super::interrupt;
+use super::prompt::{Prompt, Typed};
 use crate::evolver::{
     Document, EvolverError,
     datafile::{Model, Purpose, Representation},
@@ -14,7 +15,7 @@ use clap::{Args, Subcommand};
 use std::{
     fmt::Write as _,
     fs,
-    io::{self, BufRead, IsTerminal, Write as _},
+    io::{self, IsTerminal, Write as _},
     path::{Path, PathBuf},
 };
 
@@ -62,7 +63,7 @@ struct RunArguments {
     /// Run the file as it is printed, wrong faces and all
     #[arg(long, conflicts_with = "fix")]
     as_printed: bool,
-    /// Stop after so many commands
+    /// Stop after so many commands and steps of g
     #[arg(long, value_name = "COUNT", default_value_t = COMMAND_BUDGET)]
     max_commands: u64,
 }
@@ -261,17 +262,34 @@ fn all_commands(
     session.run(&source, &parse_commands(&source)?, host)
 }
 
-/// Commands typed one line at a time: a wrong one is told and forgotten.
+/// Commands typed line by line: a wrong one is told and forgotten, one that is not complete goes on in the next line.
 fn prompt(session: &mut Session, host: &mut Terminal) -> Result<Flow, EvolverError> {
+    let failed = |error| EvolverError::File { name: "the terminal".to_owned(), error };
+    let mut prompt = Prompt::new().map_err(failed)?;
+    let mut command = String::new();
     loop {
-        host.print("Enter command: ");
-        let _ = io::stdout().flush();
-        let mut line = String::new();
-        let read = io::stdin().lock().read_line(&mut line);
-        if !matches!(read, Ok(count) if count > 0) {
-            return Ok(Flow::Quit);
+        let shown = if command.is_empty() { "Enter command: " } else { "more> " };
+        match prompt.line(shown).map_err(failed)? {
+            Typed::End => return Ok(Flow::Quit),
+            Typed::Forget => {
+                command.clear();
+                continue;
+            }
+            Typed::Line(line) => {
+                let goes_on = !command.is_empty() && !line.trim().is_empty();
+                command.push_str(&line);
+                if open_brackets(&command) && (goes_on || command == line) {
+                    command.push('\n');
+                    continue;
+                }
+            }
         }
-        let source = Source::new("command", line);
+        let text = std::mem::take(&mut command);
+        if text.trim().is_empty() {
+            continue;
+        }
+        prompt.remember(&text.replace('\n', " "));
+        let source = Source::new("command", text);
         match parse_commands(&source).and_then(|statements| session.run(&source, &statements, host)) {
             Ok(Flow::Quit) => return Ok(Flow::Quit),
             Ok(_) => {}
@@ -279,6 +297,12 @@ fn prompt(session: &mut Session, host: &mut Terminal) -> Result<Flow, EvolverErr
             Err(error) => eprintln!("error: {error}"),
         }
     }
+}
+
+/// Whether more brackets open than close: the command goes on.
+fn open_brackets(text: &str) -> bool {
+    let count = |brackets: [char; 3]| text.matches(brackets).count();
+    count(['{', '(', '[']) > count(['}', ')', ']'])
 }
 
 /// Energy, volumes, pressures and quantities.

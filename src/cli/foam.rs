@@ -32,6 +32,15 @@ pub(super) enum DensityName {
     Uniform,
 }
 
+/// How a foam ends at open faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum OpenFacesName {
+    /// At frictionless plane walls, which films meet at a right angle
+    Walls,
+    /// It goes on periodically; at walls where two faces are no whole periods apart, as at the cut through a half cell
+    Periodic,
+}
+
 /// A step after which to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum StageName {
@@ -109,7 +118,9 @@ pub(super) struct SpaceArguments {
   combwright foam --surface sphere --radii 1.0,1.05 --cells 32
   combwright foam --surface torus --tube 0.9,1.0 --ring 5
   combwright foam --surface plane --periods 8,8 --height 0.5
-  combwright foam --recipe enclosures/paper/recipe.toml --cell-width 20mm
+  combwright foam --recipe enclosures/large-250/recipe.toml --cell-width 20mm
+  combwright foam --recipe enclosures/test-print/recipe.toml --cells 48 --open-faces periodic
+  combwright foam --surface plane --periods 8,8 --height 0.5 --open-faces walls
   combwright foam --stop-after partition --density uniform
   combwright foam --cells 32 --runs 100 -j 2
   combwright foam --cells 32 --anneal 200
@@ -124,9 +135,14 @@ pub(super) struct FoamArguments {
     #[command(flatten)]
     pub(super) space: SpaceArguments,
 
-    /// The gap of an enclosure's recipe (TOML), one whole period of it; lengths are then in mm
+    /// The gap of an enclosure's recipe (TOML), as much of it as is printed; lengths are then in mm
     #[arg(long, value_name = "FILE", conflicts_with_all = ["surface", "period", "delta", "parallel"], help_heading = "Space")]
     pub(super) recipe: Option<PathBuf>,
+
+    /// How the foam ends at open faces: of a recipe's enclosure [default: walls], of one cell of Schwarz' P, or of planes
+    /// [default: periodic]
+    #[arg(long, value_enum, help_heading = "Space")]
+    pub(super) open_faces: Option<OpenFacesName>,
 
     /// The number of cells [default: 64, or as many as --cell-width says]
     #[arg(short = 'n', long, value_name = "N", allow_negative_numbers = true, help_heading = "Cells")]
@@ -222,6 +238,7 @@ const RESUME_CONFLICTS: &[&str] = &[
     "cold",
     "lloyd",
     "recipe",
+    "open_faces",
     "cell_width",
     "elements",
     "tolerance",

@@ -184,13 +184,10 @@ fn make(settings: &FoamSettings, gap: &Gap) -> Result<MadeRun, CliError> {
     let domain = settings.space.domain().map_err(CliError::mistake)?;
     let start =
         start(gap, &domain, &settings.seeds, &mut |_| interrupt::flow()).map_err(CliError::failure)?;
-    let Some(network) = start.network else {
-        return Err(CliError::failure(anyhow!("the partition gave no network")));
-    };
     let job = Job::new(settings, start.seeds.psi6);
     let hidden = ProgressBar::hidden();
     let mut keeper = Keeper::new(&job, &hidden, None, Vec::new());
-    let relaxed = keeper.relax(Begin::Network(network), gap)?;
+    let relaxed = keeper.relax(Begin::Network(start.network), gap)?;
     let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, &hidden)?;
     let made = Made::new(&job, gap, relaxed, keeper.record)?;
     Ok((job, start.seeds, made, annealing))

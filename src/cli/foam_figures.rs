@@ -24,7 +24,9 @@ pub(super) struct Figures {
     pub(super) energy_over_flat: f64,
     /// How many cells have 0, 1, 2 … sides.
     pub(super) side_counts: Vec<usize>,
-    /// Σ (6 − n).
+    /// How many cells end at planes that cut the gap off; they have no number of sides.
+    pub(super) cut_cells: usize,
+    /// Σ (6 − n) over the cells that are not cut.
     pub(super) charge: i64,
     pub(super) gap_volume: f64,
     /// The largest relative deviation of a cell's volume from its target.
@@ -109,6 +111,12 @@ fn audit_in_words(audit: &Audit) -> String {
     }
 }
 
+/// How many cells have how many sides, and how many are cut.
+fn sides_in_words(figures: &Figures) -> String {
+    let complete = foam_run::by_sides(&figures.side_counts);
+    if figures.cut_cells == 0 { complete } else { format!("{complete}, cut: {}", figures.cut_cells) }
+}
+
 /// The figures in words.
 pub(super) fn table(figures: &Figures) -> Vec<Line> {
     let mut lines = vec![
@@ -117,7 +125,7 @@ pub(super) fn table(figures: &Figures) -> Vec<Line> {
         ("ended", in_words(figures.ended)),
         ("energy", format!("{:.10}", figures.energy)),
         ("over flat foam", format!("{:.6}", figures.energy_over_flat)),
-        ("cells by sides", foam_run::by_sides(&figures.side_counts)),
+        ("cells by sides", sides_in_words(figures)),
         ("charge Σ(6−n)", figures.charge.to_string()),
         ("pressures", format!("{:.4} to {:.4}, mean 0", figures.pressure_min, figures.pressure_max)),
         ("volume of the gap", format!("{:.12}", figures.gap_volume)),

@@ -48,6 +48,9 @@ const CHECKPOINT: &str = "checkpoint.json";
 /// The time from one checkpoint to the next: short against the work that would be lost, long against writing one.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(20);
 
+/// The relative difference of two measures of the gap's volume that is no error of theirs.
+const HOLE: f64 = 1e-5;
+
 /// What is relaxed, and where it came from.
 pub(super) struct Job {
     pub(super) space: FoamSpace,
@@ -87,15 +90,13 @@ pub(super) fn run(
     let began = Instant::now();
     let start = foam_run::started(settings, gap, bar)?;
     let until_partition = began.elapsed().as_secs_f64();
-    let Some(network) = start.network else {
-        return Err(CliError::failure(anyhow!("the partition gave no network")));
-    };
     let job = Job::new(settings, start.seeds.psi6);
     let mut keeper = Keeper::new(&job, bar, Some(folder.target().join(CHECKPOINT)), Vec::new());
-    let relaxed = keeper.relax(Begin::Network(network), gap)?;
+    let relaxed = keeper.relax(Begin::Network(start.network), gap)?;
     let until_relaxed = began.elapsed().as_secs_f64();
     let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, bar)?;
     let made = Made::new(&job, gap, relaxed, keeper.record)?.finished(&job, settings, gap, annealing)?;
+    made.fills(start.partition.volume())?;
     let seconds = vec![
         ("seeds and partition", until_partition),
         ("relaxation", until_relaxed - until_partition),
@@ -276,6 +277,7 @@ impl Made {
             flat_hexagonal_energy: flat,
             energy_over_flat: energy / flat,
             side_counts: pattern.side_counts(),
+            cut_cells: cells.sides.iter().filter(|&&sides| sides == 0).count(),
             charge: pattern.charge(),
             gap_volume: total,
             volume_error: cells.volumes.iter().zip(&state.shares).map(error).fold(0.0, f64::max),
@@ -297,6 +299,19 @@ impl Made {
 }
 
 impl Made {
+    /// Whether the cells fill the whole gap, whose volume the partition measured on its own: cells that were lost at a corner
+    /// or between two planes would leave a hole, which no residual shows.
+    fn fills(&self, gap_volume: f64) -> Result<(), CliError> {
+        let missing = self.figures.gap_volume / gap_volume - 1.0;
+        if self.relaxed.state.part < 1.0 || missing.abs() < HOLE {
+            return Ok(());
+        }
+        Err(CliError::failure(anyhow!(
+            "the cells fill {:.3e} of the gap's volume too much: a film has left the box at a corner, with too few cells for these faces. Ask for more cells or another seed",
+            missing
+        )))
+    }
+
     /// With what takes some more time: a settled foam's lowest eigenvalue, and its energy without a mesh if asked for.
     pub(super) fn finished(
         mut self,

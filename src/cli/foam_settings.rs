@@ -1,11 +1,11 @@
 //! From what was typed about a foam to what is meant, with all faults at once.
 
-use super::foam::{DensityName, FoamArguments, SpaceArguments, StageName, SurfaceName};
+use super::foam::{DensityName, FoamArguments, OpenFacesName, SpaceArguments, StageName, SurfaceName};
 use crate::foam::{
     complex::Strips,
     relax::RelaxSettings,
     seeds::{Density, SeedSettings},
-    setup::{FoamSpace, PeriodicSurface, PeriodicWalls},
+    setup::{FoamSpace, OpenFaces, PeriodicSurface, PeriodicWalls},
 };
 use crate::{
     enclosure::{Design, Recipe},
@@ -87,15 +87,23 @@ impl FoamSettings {
     /// The settings that the arguments mean.
     pub(super) fn from_arguments(arguments: &FoamArguments) -> Result<Self, Faults> {
         let mut faults = unused(&arguments.space);
+        let open_faces = arguments.open_faces.map(|name| match name {
+            OpenFacesName::Walls => OpenFaces::Walls,
+            OpenFacesName::Periodic => OpenFaces::Periodic,
+        });
         let space = match &arguments.recipe {
-            Some(file) => recipe_space(file).map_err(|fault| Faults(vec![fault]))?,
-            None => space(&arguments.space, &mut faults),
+            Some(file) => recipe_space(file, open_faces.unwrap_or(OpenFaces::Walls))
+                .map_err(|fault| Faults(vec![fault]))?,
+            None => ended(space(&arguments.space, &mut faults), open_faces, &mut faults),
         };
+        if arguments.layers == 2 && matches!(space, FoamSpace::Piece { .. } | FoamSpace::Box { .. }) {
+            faults.push("two layers of cells need a period: plane walls are for one layer".to_owned());
+        }
         let mut cells = arguments.cells.unwrap_or(DEFAULT_CELLS);
         match space.gap() {
             Ok(gap) => {
                 if let Some(width) = arguments.cell_width {
-                    cells = cells_of_width(&gap, width, &mut faults);
+                    cells = cells_of_width(&space, &gap, width, &mut faults);
                 }
             }
             Err(error) if faults.is_empty() => faults.push(error.to_string()),
@@ -191,33 +199,64 @@ fn few_on_a_sphere(space: &FoamSpace, cells: usize) -> Option<String> {
     ))
 }
 
-/// One period of the gap that an enclosure's recipe describes, in mm.
-fn recipe_space(file: &Path) -> Result<FoamSpace, String> {
+/// A space of periods, ended as was asked: planes in a box, one cell of Schwarz' P closed by its mirror planes.
+fn ended(space: FoamSpace, open_faces: Option<OpenFaces>, faults: &mut Vec<String>) -> FoamSpace {
+    match (space, open_faces) {
+        (FoamSpace::Plane { periods, height }, Some(OpenFaces::Walls)) => {
+            FoamSpace::Box { sides: periods, height }
+        }
+        (
+            FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period, walls },
+            Some(open_faces @ OpenFaces::Walls),
+        ) => FoamSpace::Piece { period, walls, low: [0; 3], high: [2; 3], open_faces },
+        (FoamSpace::Plane { .. } | FoamSpace::Periodic { .. }, None | Some(OpenFaces::Periodic))
+        | (_, None) => space,
+        (_, Some(_)) => {
+            faults.push("--open-faces is for Schwarz' P, for planes and for recipes: this surface has no planes of mirror symmetry to end at, or no open faces".to_owned());
+            space
+        }
+    }
+}
+
+/// The gap that an enclosure's recipe describes, as much of it as is printed, in mm.
+fn recipe_space(file: &Path, open_faces: OpenFaces) -> Result<FoamSpace, String> {
     let named = |error: &dyn fmt::Display| format!("{}: {error}", file.display());
     let text = fs::read_to_string(file).map_err(|error| named(&error))?;
     let recipe = Recipe::parse(&text).map_err(|error| named(&error))?;
     let design = Design::new(&recipe).map_err(|error| named(&error))?;
-    Ok(space_of(&design))
+    let (low, high) = (design.region.low, design.region.high);
+    let one_period = (0..3).all(|axis| high[axis] - low[axis] == 2);
+    if one_period && open_faces == OpenFaces::Periodic {
+        return Ok(space_of(&design));
+    }
+    Ok(FoamSpace::Piece { period: design.period.0, walls: walls_of(&design), low, high, open_faces })
 }
 
 /// One whole period of a design's gap, in mm.
 pub(super) fn space_of(design: &Design) -> FoamSpace {
+    let kind = PeriodicSurface::SchwarzP;
+    FoamSpace::Periodic { kind, period: design.period.0, walls: walls_of(design) }
+}
+
+/// The walls of a design's gap, in mm.
+fn walls_of(design: &Design) -> PeriodicWalls {
     let [lower, upper] = design.gap.walls();
-    let period = design.period.0;
-    let walls = match design.gap.kind() {
+    match design.gap.kind() {
         GapKind::LevelSet => PeriodicWalls::LevelSet { delta: upper.level },
-        GapKind::Parallel => PeriodicWalls::Parallel { gap: (upper.level - lower.level) * period },
-    };
-    FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period, walls }
+        GapKind::Parallel => PeriodicWalls::Parallel { gap: (upper.level - lower.level) * design.period.0 },
+    }
 }
 
 /// How many hexagons of this width cover the middle surface.
-fn cells_of_width(gap: &Gap, width: Mm, faults: &mut Vec<String>) -> usize {
+fn cells_of_width(space: &FoamSpace, gap: &Gap, width: Mm, faults: &mut Vec<String>) -> usize {
     if width.0 <= 0.0 {
         faults.push(format!("--cell-width is {width}: it must be positive"));
         return DEFAULT_CELLS;
     }
-    let area = SurfaceSamples::new(gap.middle().as_ref(), 0.0, AREA_LINES).area();
+    let surface = gap.middle().as_ref();
+    // A box of half periods holds as many halves of a period's area.
+    let periods = space.domain().map_or(1.0, |domain| domain.periods_of(surface));
+    let area = periods * SurfaceSamples::new(surface, 0.0, AREA_LINES).area();
     let hexagon = 0.5 * 3.0_f64.sqrt() * width.0 * width.0;
     #[expect(
         clippy::cast_possible_truncation,

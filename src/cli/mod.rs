@@ -9,7 +9,7 @@
 //! | `foam` | `foam.rs`, `foam_settings.rs`, `foam_run.rs`, `foam_relax.rs`, `foam_batch.rs` |
 //! | `foam bubble`, `foam --layers 2` | `foam_bubble.rs`, `foam_layers.rs` |
 //! | how a command ends, progress on a terminal, Ctrl-C | `outcome.rs`, `progress.rs`, `interrupt.rs` |
-//! | `evolver check`, `evolver run` | `evolver.rs` |
+//! | `evolver check`, `evolver run` | `evolver.rs`, `prompt.rs` |
 //! | `comb`, `comb render`, `comb score` | `comb.rs`, `comb_render.rs`, `comb_score.rs` |
 //! | `compare` | `compare.rs`, `compare_wall.rs` |
 //! | `demo`, `view` | `demo.rs`, `demo_comb.rs`, `view.rs` |
@@ -40,6 +40,7 @@ mod interrupt;
 mod manual;
 mod outcome;
 mod progress;
+mod prompt;
 mod view;
 
 use clap::{CommandFactory, Parser, Subcommand};

@@ -2,17 +2,24 @@
 //!
 //! Cells are named by a point in them, not by their number, so that corrections hold when the photograph is read again.
 //! Cells added, removed, joined and split change what is segmented, so that their neighbours' walls are found anew; numbers
-//! of sides and statuses are set at the end.
+//! of sides and statuses are set at the end. Where two corrections speak of one cell, the later one holds.
 
 use super::{Comb, lattice::Site, table::CellRow};
 use crate::tessellation::{CellId, CellStatus};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// The name and version of the form of `corrections.json`.
 const CORRECTIONS_SCHEMA: &str = "combwright.corrections/1";
 /// A correction means the nearest cell within this many pitches.
 const WITHIN: f64 = 0.5;
+/// Numbers of sides that a person may give.
+const SIDES: RangeInclusive<u32> = 3..=12;
+/// Cells that are joined lie within this many pitches of one another; the halves of a split one within this of its middle.
+const BESIDE: f64 = 1.6;
+/// Halves of a split cell are at least this many pitches apart.
+const APART: f64 = 0.2;
 /// A row of an edited table means the cell within this many pitches.
 const SAME: f64 = 0.35;
 
@@ -20,12 +27,12 @@ const SAME: f64 = 0.35;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Correction {
-    /// There is a cell here.
+    /// There is a cell here; it takes the place of a hidden one.
     Add {
         /// Its centre.
         at: DVec2,
     },
-    /// There is no cell here.
+    /// There is no cell here; those around it are cut.
     Remove {
         /// A point in it.
         at: DVec2,
@@ -44,7 +51,7 @@ pub enum Correction {
         /// The centres of the two.
         into: [DVec2; 2],
     },
-    /// A cell has this many sides; it is complete then.
+    /// A cell has this many sides, 3 to 12; it is complete then, and seen.
     Sides {
         /// A point in it.
         at: DVec2,
@@ -94,7 +101,8 @@ pub enum CorrectionError {
     },
     /// There is no cell at the point.
     #[error(
-        "correction {number} ({what}): no cell within half a pitch of ({x:.1}, {y:.1}); check the point, or add the cell"
+        "correction {number} ({what}): no cell within half a pitch of ({x:.1}, {y:.1}); check the point and whether the \
+         corrections belong to this photograph, or add the cell"
     )]
     NoCell {
         /// Place in the list, from 1.
@@ -105,6 +113,16 @@ pub enum CorrectionError {
         x: f64,
         /// The point.
         y: f64,
+    },
+    /// What it says cannot be.
+    #[error("correction {number} ({what}): {why}")]
+    Senseless {
+        /// Place in the list, from 1.
+        number: usize,
+        /// What it would do.
+        what: &'static str,
+        /// Why not, and what to do.
+        why: String,
     },
 }
 
@@ -158,6 +176,21 @@ impl Corrections {
         Self::new(corrections)
     }
 
+    /// The corrections of `self` and then those of `more`.
+    #[must_use]
+    pub fn and(mut self, more: Self) -> Self {
+        self.corrections.extend(more.corrections);
+        self
+    }
+
+    /// Whether every correction can be meant, in a photograph of the given size and pitch in pixels.
+    pub(crate) fn check(&self, size: DVec2, pitch: f64) -> Result<(), CorrectionError> {
+        for (index, correction) in self.corrections.iter().enumerate() {
+            correction.check(size, pitch).map_err(|why| senseless(index, correction.name(), why))?;
+        }
+        Ok(())
+    }
+
     /// Adds, removes and splits places of the lattice; points are brought to the raster by `to_raster`.
     pub(crate) fn place(
         &self,
@@ -166,22 +199,27 @@ impl Corrections {
         pitch: f64,
     ) -> Result<(), CorrectionError> {
         for (index, correction) in self.corrections.iter().enumerate() {
-            let find = |what, at: DVec2, sites: &[Site]| {
-                nearest_site(sites, to_raster(at), WITHIN * pitch).ok_or_else(|| missing(index, what, at))
+            let within = WITHIN * pitch;
+            let find = |at: DVec2, sites: &[Site]| {
+                let place = nearest_site(sites, to_raster(at), within, |site| !site.removed);
+                place.ok_or_else(|| missing(index, correction.name(), at))
             };
             match correction {
-                Correction::Add { at } => sites.push(Site::by_hand(to_raster(*at))),
+                Correction::Add { at } => add(sites, to_raster(*at), pitch)
+                    .map_err(|why| senseless(index, correction.name(), why))?,
                 Correction::Remove { at } => {
-                    sites.remove(find("remove", *at, sites)?);
+                    let place = find(*at, sites)?;
+                    sites[place].removed = true;
                 }
                 Correction::Split { at, into } => {
-                    sites.remove(find("split", *at, sites)?);
+                    sites.remove(find(*at, sites)?);
                     sites.extend(into.iter().map(|part| Site::by_hand(to_raster(*part))));
                 }
-                Correction::Join { .. }
-                | Correction::Sides { .. }
-                | Correction::Status { .. }
-                | Correction::Mask { .. } => {}
+                Correction::Sides { at, .. } | Correction::Status { at, status: CellStatus::Complete } => {
+                    let place = find(*at, sites)?;
+                    sites[place].by_hand |= sites[place].depth > 0;
+                }
+                Correction::Join { .. } | Correction::Status { .. } | Correction::Mask { .. } => {}
             }
         }
         Ok(())
@@ -198,8 +236,8 @@ impl Corrections {
         for (index, correction) in self.corrections.iter().enumerate() {
             if let Correction::Join { at, with } = correction {
                 let find = |at: DVec2| {
-                    nearest_site(sites, to_raster(at), WITHIN * pitch)
-                        .ok_or_else(|| missing(index, "join", at))
+                    nearest_site(sites, to_raster(at), WITHIN * pitch, |site| !site.removed)
+                        .ok_or_else(|| missing(index, correction.name(), at))
                 };
                 let (a, b) = (find(*at)?, find(*with)?);
                 pairs.push((a.min(b), a.max(b)));
@@ -237,12 +275,85 @@ impl Corrections {
                         cell.sides = u32::try_from(cell.walls.len()).ok();
                     }
                     cell.status = *status;
+                    if *status == CellStatus::Complete {
+                        cell.confidence = 1.0;
+                    }
                 }
                 _ => {}
             }
         }
         Ok(())
     }
+}
+
+impl Correction {
+    /// The word that it is written by.
+    const fn name(&self) -> &'static str {
+        match self {
+            Self::Add { .. } => "add",
+            Self::Remove { .. } => "remove",
+            Self::Join { .. } => "join",
+            Self::Split { .. } => "split",
+            Self::Sides { .. } => "sides",
+            Self::Status { .. } => "status",
+            Self::Mask { .. } => "mask",
+        }
+    }
+
+    /// The points that must lie in the photograph.
+    fn points(&self) -> Vec<DVec2> {
+        match self {
+            Self::Add { at } | Self::Remove { at } | Self::Sides { at, .. } | Self::Status { at, .. } => {
+                vec![*at]
+            }
+            Self::Join { at, with } => vec![*at, *with],
+            Self::Split { at, into: [one, other] } => vec![*at, *one, *other],
+            Self::Mask { .. } => Vec::new(),
+        }
+    }
+
+    /// What cannot be meant by it.
+    fn check(&self, size: DVec2, pitch: f64) -> Result<(), String> {
+        let within = |p: &DVec2| p.cmpge(DVec2::ZERO).all() && p.cmple(size).all();
+        if let Some(p) = self.points().iter().find(|p| !within(p)) {
+            return Err(format!("({}, {}) is not in the photograph of {} x {} px", p.x, p.y, size.x, size.y));
+        }
+        match self {
+            Self::Sides { sides, .. } if !SIDES.contains(sides) => {
+                Err(format!("{sides} is not a number of sides; {} to {} are", SIDES.start(), SIDES.end()))
+            }
+            Self::Join { at, with } if at.distance(*with) > BESIDE * pitch => Err(format!(
+                "the two points are {:.0} px apart, but cells are {pitch:.0} px wide; only neighbours can be joined",
+                at.distance(*with)
+            )),
+            Self::Split { into: [one, other], .. } if one.distance(*other) < APART * pitch => {
+                Err("the centres of the two parts coincide".to_owned())
+            }
+            Self::Split { at, into } if into.iter().any(|part| part.distance(*at) > BESIDE * pitch) => {
+                Err(format!("the centres of the two parts are not in the cell, which is {pitch:.0} px wide"))
+            }
+            Self::Mask { polygon } if polygon.len() < 3 || polygon.iter().any(|p| !p.is_finite()) => {
+                Err(format!("a polygon has three corners or more, this one has {}", polygon.len()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Puts a cell at a point, in place of a hidden or a removed one.
+fn add(sites: &mut Vec<Site>, at: DVec2, pitch: f64) -> Result<(), String> {
+    if nearest_site(sites, at, SAME * pitch, Site::is_seen).is_some() {
+        return Err("a cell was found there; split it if it is two".to_owned());
+    }
+    if let Some(place) = nearest_site(sites, at, WITHIN * pitch, |site| !site.is_seen()) {
+        sites.remove(place);
+    }
+    sites.push(Site::by_hand(at));
+    Ok(())
+}
+
+const fn senseless(index: usize, what: &'static str, why: String) -> CorrectionError {
+    CorrectionError::Senseless { number: index + 1, what, why }
 }
 
 fn missing(index: usize, what: &'static str, at: DVec2) -> CorrectionError {
@@ -258,10 +369,10 @@ fn nearest(comb: &Comb, at: DVec2, within: f64) -> Option<CellId> {
         .filter(|id| distance(*id) < within * comb.pitch)
 }
 
-fn nearest_site(sites: &[Site], at: DVec2, within: f64) -> Option<usize> {
-    (0..sites.len())
-        .min_by(|a, b| sites[*a].position.distance(at).total_cmp(&sites[*b].position.distance(at)))
-        .filter(|i| sites[*i].position.distance(at) < within)
+fn nearest_site(sites: &[Site], at: DVec2, within: f64, meant: impl Fn(&Site) -> bool) -> Option<usize> {
+    let distance = |i: &usize| sites[*i].position.distance(at);
+    let meant = (0..sites.len()).filter(|i| meant(&sites[*i]));
+    meant.min_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|i| distance(i) < within)
 }
 
 /// Whether a polygon holds a point, by the parity of crossings to its right.

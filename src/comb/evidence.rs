@@ -8,6 +8,8 @@ use rayon::prelude::*;
 pub(crate) const RAYS: usize = 36;
 /// A ray's wall is looked for this far before and behind the region's edge, in pitches.
 const WALL_WINDOW: f64 = 0.1;
+/// A wall that is highest this near to the photograph's border, in pixels of the raster, may be higher beyond it.
+const LAST_PIXELS: f64 = 1.0;
 /// A ray meets a wall if the relief rises by at least this from the cell's inside; a typical wall rises by 1.5 to 2.
 const WALL_RISE: f64 = 0.55;
 
@@ -18,7 +20,9 @@ pub(crate) struct Evidence {
     pub(crate) radii: [f64; RAYS],
     /// Share of rays that end within the photograph, or meet the wall before they leave it.
     pub(crate) visible: f64,
-    /// Share of those rays that meet a wall.
+    /// Share of all rays along which the wall is highest at the photograph's border, so that only its inner half can be seen.
+    pub(crate) at_border: f64,
+    /// Share of the rays that are visible that meet a wall.
     pub(crate) closure: f64,
     /// Mean rise of the levelled relief from the inside to the wall.
     pub(crate) rise: f64,
@@ -61,7 +65,7 @@ pub(crate) fn gather(
 fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch: f64) -> Evidence {
     let mut radii = [0.0; RAYS];
     let mut rims = Vec::with_capacity(RAYS);
-    let (mut closed, mut rise, mut contrast) = (0.0, 0.0, 0.0);
+    let (mut closed, mut rise, mut contrast, mut at_border) = (0.0, 0.0, 0.0, 0.0);
     let window = WALL_WINDOW * pitch;
     let middle_raw = middle(rasters.wallness, centre, pitch);
     for (ray, reached) in radii.iter_mut().enumerate() {
@@ -70,8 +74,11 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
         let highest = |plane: &Plane| highest(plane, centre, step, radius - window, radius + window);
         *reached = radius;
         let height = highest(rasters.relief) - inside;
-        if !rasters.segmentation.holds(centre + step * (radius + 1.0)) && height < WALL_RISE {
-            continue;
+        if !rasters.segmentation.holds(centre + step * (radius + 1.0)) {
+            at_border += f64::from(u8::from(rises_to(rasters.relief, centre, step, radius, pitch)));
+            if height < WALL_RISE {
+                continue;
+            }
         }
         rise += height;
         contrast += highest(rasters.wallness) - middle_raw;
@@ -85,6 +92,7 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
     Evidence {
         radii,
         visible: rims.len() as f64 / RAYS as f64,
+        at_border: at_border / RAYS as f64,
         closure: closed,
         rise,
         contrast,
@@ -130,6 +138,12 @@ fn highest(plane: &Plane, centre: DVec2, step: DVec2, from: f64, to: f64) -> f64
         radius += 0.75;
     }
     best
+}
+
+/// Whether the relief is highest, in the outer half of a ray, within the last pixels.
+fn rises_to(plane: &Plane, centre: DVec2, step: DVec2, radius: f64, pitch: f64) -> bool {
+    let end = radius - LAST_PIXELS;
+    highest(plane, centre, step, end, radius) > highest(plane, centre, step, 0.25 * pitch, end)
 }
 
 /// Where the relief last rises above `level` on the way out: the rim of the opening.

@@ -11,6 +11,8 @@ use glam::DVec2;
 const CLOSURE: f64 = 0.65;
 /// Least share of the middle that must be lower than the wall. Caps and pollen of a wall's colour are below it.
 const OPENNESS: f64 = 0.7;
+/// The same between cells that are open: pollen, glare and nectar fill much of the middle there.
+const ENCLOSED_OPENNESS: f64 = 0.5;
 /// The same for a cell that the border of the photograph cuts, between two cells that are seen.
 const PARTIAL_OPENNESS: f64 = 0.5;
 /// Least mean rise of the levelled relief; noise that was levelled up rises by about 0.5.
@@ -46,7 +48,7 @@ pub(crate) fn classify(
     whole: &[bool],
 ) -> Vec<Kind> {
     let typical = median(evidence.iter().zip(whole).filter(|(_, w)| **w).map(|(e, _)| e.contrast));
-    let open: Vec<bool> = evidence.iter().map(|e| is_open(e, typical)).collect();
+    let open: Vec<bool> = evidence.iter().map(|e| is_open(e, typical, OPENNESS)).collect();
     let anchored = pieces(centres, pitches, &open);
     let grid = Grid::of(centres, median(pitches.iter().copied()).max(1.0));
     let partial = |i: usize| {
@@ -57,7 +59,7 @@ pub(crate) fn classify(
     (0..centres.len())
         .map(|i| match (anchored[i], inside[i]) {
             (true, _) => Kind::Seen,
-            (false, true) if open[i] => Kind::Seen,
+            (false, true) if is_open(&evidence[i], typical, ENCLOSED_OPENNESS) => Kind::Seen,
             (false, false) if partial(i) => Kind::Seen,
             (false, true) => Kind::Hidden,
             (false, false) => Kind::Outside,
@@ -65,9 +67,9 @@ pub(crate) fn classify(
         .collect()
 }
 
-fn is_open(evidence: &Evidence, typical: f64) -> bool {
+fn is_open(evidence: &Evidence, typical: f64, least_openness: f64) -> bool {
     evidence.closure >= CLOSURE
-        && evidence.openness >= OPENNESS
+        && evidence.openness >= least_openness
         && evidence.rise >= RISE
         && evidence.contrast >= CONTRAST * typical
         && evidence.unevenness <= UNEVENNESS
@@ -114,7 +116,7 @@ fn between(centres: &[DVec2], pitches: &[f64], anchored: &[bool]) -> Vec<bool> {
     let pitch = median(seen.iter().map(|i| pitches[*i])).max(1.0);
     let grid = Grid::of(centres, pitch);
     let mut inside = vec![false; centres.len()];
-    for corners in Delaunay::of(&points).triangles {
+    for corners in Delaunay::of(&points).triangles() {
         let [a, b, c] = corners.map(|i| points[i]);
         let Some(middle) = circumcentre(a, b, c) else { continue };
         let radius = middle.distance(a);

@@ -7,6 +7,7 @@
 
 use super::{grid::Grid, peaks::Peak, triangulation::Delaunay};
 use glam::DVec2;
+use rayon::prelude::*;
 
 /// Greatest deviation of a seed's six neighbour distances from their mean.
 const DISTANCE_SPREAD: f64 = 0.25;
@@ -14,12 +15,16 @@ const DISTANCE_SPREAD: f64 = 0.25;
 const SEED_ORDER: f64 = 0.75;
 /// A seed's mean neighbour distance lies within this factor of the pitch.
 const PITCH_FACTOR: f64 = 1.4;
+/// Points that are not worth sharing among threads.
+const POINTS_PER_TASK: usize = 256;
 /// Edges of a good triangle, in pitches.
 const GOOD_EDGE: (f64, f64) = (0.55, 1.55);
 /// A blob this near to its predicted place (in pitches) is the predicted cell.
 const SNAP: f64 = 0.38;
 /// Two cells are never nearer than this (in pitches).
 const CLOSEST: f64 = 0.58;
+/// Cells this near to an inferred one (in pitches) settle which are its neighbours: twice the longest good edge.
+const AROUND: f64 = 2.0 * GOOD_EDGE.1;
 /// Layers of inferred cells that may follow one another: half the width of the widest cap that is bridged.
 const INFERRED_LAYERS: usize = 7;
 
@@ -34,7 +39,8 @@ pub(crate) struct Neighbourhood {
 pub(crate) fn hexagonal_neighbourhoods(points: &[DVec2], pitch: f64) -> Vec<Option<Neighbourhood>> {
     let grid = Grid::of(points, pitch);
     points
-        .iter()
+        .par_iter()
+        .with_min_len(POINTS_PER_TASK)
         .map(|point| {
             let mut near: Vec<(usize, f64)> =
                 grid.within(*point, 1.8 * pitch).filter(|(_, squared)| *squared > 0.0).collect();
@@ -51,10 +57,16 @@ fn hexagonal(steps: &[DVec2], pitch: f64) -> Option<Neighbourhood> {
         return None;
     }
     let distance = steps.iter().map(|s| s.length()).sum::<f64>() / 6.0;
-    let sixfold: DVec2 = steps.iter().map(|s| DVec2::from_angle(6.0 * s.to_angle())).sum();
+    let sixfold: DVec2 = steps.iter().map(|s| sixth_power(s.normalize_or_zero())).sum();
     let even = steps.iter().all(|s| (s.length() / distance - 1.0).abs() < DISTANCE_SPREAD);
     let sized = distance < pitch * PITCH_FACTOR && distance * PITCH_FACTOR > pitch;
     (even && sized && sixfold.length() / 6.0 > SEED_ORDER).then_some(Neighbourhood { distance })
+}
+
+/// The direction at six times the angle.
+fn sixth_power(direction: DVec2) -> DVec2 {
+    let square = direction.rotate(direction);
+    square.rotate(square).rotate(square)
 }
 
 /// The pitch as it varies over the photograph.
@@ -118,16 +130,23 @@ pub(crate) struct Site {
     pub(crate) depth: usize,
     /// Whether a person says that there is a cell.
     pub(crate) by_hand: bool,
+    /// Whether a person says that there is none: its pixels are then taken from all cells.
+    pub(crate) removed: bool,
 }
 
 impl Site {
     const fn new(position: DVec2, depth: usize) -> Self {
-        Self { position, depth, by_hand: false }
+        Self { position, depth, by_hand: false, removed: false }
     }
 
     /// A cell that a person has added.
     pub(crate) const fn by_hand(position: DVec2) -> Self {
-        Self { position, depth: 0, by_hand: true }
+        Self { position, depth: 0, by_hand: true, removed: false }
+    }
+
+    /// Whether a blob was seen here, and no person says otherwise.
+    pub(crate) const fn is_seen(&self) -> bool {
+        self.depth == 0 && !self.by_hand && !self.removed
     }
 }
 
@@ -170,6 +189,7 @@ struct Growth<'a> {
     sites: Vec<Site>,
     taken: Vec<bool>,
     site_grid: Grid,
+    triangles: Delaunay,
 }
 
 /// A place predicted beyond an open edge of a good triangle.
@@ -190,6 +210,7 @@ impl<'a> Growth<'a> {
             sites: Vec::new(),
             taken: vec![false; peaks.len()],
             site_grid: Grid::new(edge),
+            triangles: Delaunay::default(),
         };
         for index in (0..peaks.len()).filter(|i| seeds[*i]) {
             growth.take(index);
@@ -204,19 +225,19 @@ impl<'a> Growth<'a> {
 
     fn add(&mut self, site: Site) {
         self.site_grid.insert(site.position, self.sites.len());
+        self.triangles.add(site.position);
         self.sites.push(site);
     }
 
     fn predictions(&self) -> Vec<Prediction> {
-        let points: Vec<DVec2> = self.sites.iter().map(|s| s.position).collect();
-        let delaunay = Delaunay::of(&points);
         let mut found = Vec::new();
-        for edge in &delaunay.edges {
+        for edge in self.triangles.edges() {
             let (a, b) = edge.ends;
             let mut good = edge.across().filter(|c| self.is_good(a, b, *c));
             if let (Some(third), None) = (good.next(), good.next()) {
-                let position = points[a] + points[b] - points[third];
-                let depth = self.sites[a].depth.max(self.sites[b].depth);
+                let [a, b] = [a, b].map(|end| self.sites[end]);
+                let position = a.position + b.position - self.sites[third].position;
+                let depth = a.depth.max(b.depth);
                 if self.is_free(position) {
                     found.push(Prediction { position, depth });
                 }
@@ -290,20 +311,30 @@ impl<'a> Growth<'a> {
 
     /// Moves inferred cells towards the mean of their neighbours, so that lattices that grew from two sides meet evenly.
     fn relax(&mut self) {
+        let around = self.around_inferred();
         for _ in 0..10 {
-            let points: Vec<DVec2> = self.sites.iter().map(|s| s.position).collect();
-            let neighbours = Delaunay::of(&points).neighbours(points.len());
-            for (index, site) in self.sites.iter_mut().enumerate() {
-                let near: Vec<DVec2> = neighbours[index]
-                    .iter()
-                    .map(|n| points[*n])
-                    .filter(|p| p.distance(points[index]) < GOOD_EDGE.1 * self.pitch.at(points[index]))
-                    .collect();
+            let points: Vec<DVec2> = around.iter().map(|site| self.sites[*site].position).collect();
+            let neighbours = Delaunay::of(&points).neighbours();
+            for ((site, point), near) in around.iter().zip(&points).zip(&neighbours) {
+                let site = &mut self.sites[*site];
+                let reach = GOOD_EDGE.1 * self.pitch.at(*point);
+                let near: Vec<DVec2> =
+                    near.iter().map(|n| points[*n]).filter(|p| p.distance(*point) < reach).collect();
                 let enclosed = near.len() >= 5;
                 if site.depth > 0 && enclosed {
                     site.position = near.iter().sum::<DVec2>() / near.len() as f64;
                 }
             }
         }
+    }
+
+    /// The inferred cells and those so near to one that they may tell its neighbours.
+    fn around_inferred(&self) -> Vec<usize> {
+        let mut near = vec![false; self.sites.len()];
+        for site in self.sites.iter().filter(|site| site.depth > 0) {
+            let reach = AROUND * self.pitch.at(site.position);
+            self.site_grid.within(site.position, reach).for_each(|(other, _)| near[other] = true);
+        }
+        (0..near.len()).filter(|site| near[*site]).collect()
     }
 }

@@ -209,6 +209,8 @@ pub fn read(photo: &Photo, settings: &Settings) -> Result<Comb, CombError> {
     if estimate.pitch < LEAST_PITCH {
         return Err(CombError::TooFine { pitch: estimate.pitch });
     }
+    let size = DVec2::new(photo.width() as f64, photo.height() as f64);
+    settings.corrections.check(size, estimate.pitch)?;
     let reading = read::read(&pyramid, estimate, settings)?;
     if reading.seen() < read::LEAST_CELLS {
         return Err(CombError::NoComb);

@@ -13,7 +13,7 @@ use super::{
     smooth,
     survey::{Survey, survey},
     walls::{self, Region, Wall},
-    watershed::{self, Segmentation},
+    watershed::{self, Marker, Segmentation},
 };
 use glam::DVec2;
 use std::{collections::BTreeMap, ops::RangeInclusive};
@@ -45,6 +45,9 @@ const CORNER_AREA: f64 = 0.45;
 const CORNER_TOTAL: RangeInclusive<f64> = 0.8..=1.4;
 const CORNER_RISE: f64 = 0.8;
 
+/// A cell is cut if along more than this share of its outline, two thirds of a side, only the inner half of its wall lies in the
+/// photograph.
+const AT_BORDER: f64 = 0.11;
 /// A cell that the border cuts is a sliver if less than this share of its outline is seen.
 const HALF_SEEN: f64 = 0.5;
 /// Seen cells below which there is no comb.
@@ -117,13 +120,13 @@ pub(crate) fn read(
     let origin = DVec2::new(part.left as f64, part.top as f64);
     let to_raster = |point: DVec2| (point - origin) * scale;
     settings.corrections.place(&mut survey.sites, to_raster, pitch)?;
-    let joined = settings.corrections.joined(&survey.sites, to_raster, pitch)?;
     let hidden = hidden(settings, &survey.relief, part, scale);
     if let Some(hidden) = &hidden {
         let width = survey.relief.width();
         let at = |p: DVec2| pixel(p.y, survey.relief.height()) * width + pixel(p.x, width);
         survey.sites.retain(|site| !hidden[at(site.position)]);
     }
+    let joined = settings.corrections.joined(&survey.sites, to_raster, pitch)?;
     let segmented = segment(&survey, pitch, hidden.as_deref(), &joined);
     Ok(count(&survey, segmented, scale))
 }
@@ -159,19 +162,19 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let mut centres: Vec<DVec2> = survey.sites.iter().map(|s| s.position).collect();
     let pitches: Vec<f64> = centres.iter().map(|c| survey.field.at(*c)).collect();
     centre(&mut centres, survey, &relief, &pitches, hidden);
-    let mut segmentation = watershed::flood(&relief, &centres, &pitches, hidden);
+    let mut segmentation = watershed::flood(&relief, &marked(&centres, &pitches, &survey.sites), hidden);
     let regions = walls::regions(&segmentation, &relief, &centres, &pitches);
     let walls = walls::walls(&segmentation, &relief, &regions);
     let mut into = halves(&survey.sites, &regions, &walls, &pitches);
     for (a, b) in joined {
         into[*b] = into[*a];
     }
-    let kept: Vec<usize> = (0..into.len()).filter(|i| into[*i] == *i).collect();
-    let mut place = vec![0; into.len()];
+    let kept: Vec<usize> = (0..into.len()).filter(|i| into[*i] == *i && !survey.sites[*i].removed).collect();
+    let mut place = vec![None; into.len()];
     for (new, old) in kept.iter().enumerate() {
-        place[*old] = new;
+        place[*old] = Some(new);
     }
-    segmentation.relabel(&into.iter().map(|i| place[*i]).collect::<Vec<usize>>());
+    segmentation.relabel(&into.iter().map(|i| place[*i]).collect::<Vec<Option<usize>>>());
     let pitches: Vec<f64> = kept.iter().map(|i| pitches[*i]).collect();
     let markers: Vec<DVec2> = kept.iter().map(|i| centres[*i]).collect();
     let by_hand =
@@ -186,6 +189,13 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     Segmented { segmentation, relief, centres, markers, by_hand, pitches, regions, walls }
 }
 
+fn marked(centres: &[DVec2], pitches: &[f64], sites: &[Site]) -> Vec<Marker> {
+    let places = centres.iter().zip(pitches).zip(sites);
+    places
+        .map(|((centre, pitch), site)| Marker { centre: *centre, pitch: *pitch, by_hand: site.by_hand })
+        .collect()
+}
+
 /// Moves the cells that were found to the middle of what a first flood gives them. Half the resolution is enough for that.
 fn centre(centres: &mut [DVec2], survey: &Survey, relief: &Plane, pitches: &[f64], hidden: Option<&[bool]>) {
     let (width, fill) = (relief.width(), |y: usize, row: &mut [f32]| row.copy_from_slice(relief.row(y)));
@@ -197,7 +207,7 @@ fn centre(centres: &mut [DVec2], survey: &Survey, relief: &Plane, pitches: &[f64
     let unit = COARSE as f64;
     let markers: Vec<DVec2> = centres.iter().map(|c| *c / unit).collect();
     let pitches: Vec<f64> = pitches.iter().map(|p| p / unit).collect();
-    let first = watershed::flood(&coarse, &markers, &pitches, hidden.as_deref());
+    let first = watershed::flood(&coarse, &marked(&markers, &pitches, &survey.sites), hidden.as_deref());
     let regions = walls::regions(&first, &coarse, &markers, &pitches);
     for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
         if site.depth == 0 && region.area > 0.0 && !region.on_border {
@@ -214,7 +224,8 @@ fn halves(
     walls: &BTreeMap<(usize, usize), Wall>,
     pitches: &[f64],
 ) -> Vec<usize> {
-    let found = |i: usize| sites[i].depth == 0 && !sites[i].by_hand;
+    let found = |i: usize| sites[i].is_seen();
+    let is_inferred = |i: usize| sites[i].depth > 0 && !sites[i].by_hand && !sites[i].removed;
     // An inferred place may lie on a cap: only what was found tells how low an opening is.
     let inside = |i: usize| if found(i) { regions[i].inside } else { f64::NEG_INFINITY };
     let rise = |(a, b): (usize, usize), w: &Wall| w.height - inside(a).max(inside(b));
@@ -227,7 +238,7 @@ fn halves(
         let pitch = (pitches[a] + pitches[b]) / 2.0;
         let cell = pitch * pitch * 0.75_f64.sqrt();
         let corner =
-            |i: usize| sites[i].depth > 0 && regions[i].area < CORNER_AREA * cell && !regions[i].on_border;
+            |i: usize| is_inferred(i) && regions[i].area < CORNER_AREA * cell && !regions[i].on_border;
         let halves = match (found(a), found(b)) {
             (true, true) => wall.length > 0.3 * pitch,
             (true, false) => corner(b),
@@ -258,7 +269,9 @@ fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
     let cut: Vec<bool> = regions
         .iter()
         .zip(&evidence)
-        .map(|(r, e)| r.area == 0.0 || (r.on_border && e.visible < 1.0) || r.on_nothing)
+        .map(|(r, e)| {
+            r.area == 0.0 || e.visible < 1.0 && r.on_border || e.at_border > AT_BORDER || r.on_nothing
+        })
         .collect();
     let whole: Vec<bool> = cut.iter().map(|c| !c).collect();
     let mut kinds = kinds::classify(&centres, &pitches, &evidence, &whole);

@@ -201,7 +201,7 @@ fn matched(truth: &[DVec2], found: &[DVec2]) -> Vec<Option<usize>> {
 
 /// Median distance of a centre from its nearest other.
 fn median_spacing(points: &[DVec2]) -> f64 {
-    let nearest = super::triangulation::Delaunay::of(points).neighbours(points.len());
+    let nearest = super::triangulation::Delaunay::of(points).neighbours();
     super::kinds::median(
         points
             .iter()

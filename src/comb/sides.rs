@@ -7,7 +7,7 @@
 
 use super::{
     kinds::Kind,
-    triangulation::{Delaunay, voronoi_length},
+    triangulation::{Delaunay, Edge, voronoi_length},
     walls::Wall,
 };
 use glam::DVec2;
@@ -58,7 +58,7 @@ struct Quad {
 
 /// Counts the sides of all cells.
 pub(crate) fn count(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>) -> Vec<Count> {
-    let delaunay = Delaunay::of(cells.centres);
+    let delaunay = Delaunay::of(cells.centres).edges();
     let quads = quads(cells, walls, &delaunay);
     let edges = decided(&delaunay, &quads);
     let mut counts = vec![Count { confidence: 1.0, ..Count::default() }; cells.centres.len()];
@@ -71,10 +71,10 @@ pub(crate) fn count(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>) -
     counts
 }
 
-fn quads(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>, delaunay: &Delaunay) -> Vec<Quad> {
+fn quads(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>, delaunay: &[Edge]) -> Vec<Quad> {
     let wall = |a: usize, b: usize| walls.get(&(a.min(b), a.max(b))).map_or(0.0, |w| w.length);
     let mut quads = Vec::new();
-    for edge in &delaunay.edges {
+    for edge in delaunay {
         let [Some(c), Some(d)] = edge.thirds else { continue };
         let Some(voronoi) = voronoi_length(cells.centres, edge) else { continue };
         let (a, b) = edge.ends;
@@ -95,8 +95,8 @@ fn quads(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>, delaunay: &D
 }
 
 /// The edges of the triangulation, those of negative length exchanged for the ones across.
-fn decided(delaunay: &Delaunay, quads: &[Quad]) -> BTreeSet<(usize, usize)> {
-    let mut edges: BTreeSet<(usize, usize)> = delaunay.edges.iter().map(|edge| edge.ends).collect();
+fn decided(delaunay: &[Edge], quads: &[Quad]) -> BTreeSet<(usize, usize)> {
+    let mut edges: BTreeSet<(usize, usize)> = delaunay.iter().map(|edge| edge.ends).collect();
     let mut exchanged: BTreeSet<(usize, usize)> = BTreeSet::new();
     let mut order: Vec<&Quad> = quads.iter().filter(|q| q.length < 0.0).collect();
     order.sort_by(|p, q| p.length.total_cmp(&q.length));

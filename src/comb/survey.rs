@@ -121,7 +121,7 @@ impl Blobs {
                 .max_by(|p, q| height(p).total_cmp(&height(q)))
         };
         let walls: Vec<DVec2> = Delaunay::of(&seen)
-            .edges
+            .edges()
             .iter()
             .map(|edge| (seen[edge.ends.0], seen[edge.ends.1]))
             .filter(|(a, b)| a.distance(*b) < 1.3 * self.pitch)

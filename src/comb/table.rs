@@ -3,10 +3,10 @@
 use super::Comb;
 use crate::{index::Id, tessellation::CellStatus};
 use glam::DVec2;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::io;
 
-/// A row of `cells.csv`. Columns that are missing in a file edited by hand are taken as empty.
+/// A row of `cells.csv`. What is missing at the end of a row, or left empty, in a file edited by hand is taken as 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellRow {
     /// The cell's number in the pattern.
@@ -24,14 +24,23 @@ pub struct CellRow {
     /// `complete`, `cut` or `uncertain`.
     pub status: CellStatus,
     /// The chance that `sides` is right; 0 where there is none.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub confidence: f64,
     /// Area up to the middle of the walls; 0 for hidden cells.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub area_px2: f64,
     /// Whether the cell is seen; 0 for one inferred from its neighbours.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub seen: u8,
+}
+
+/// An empty field as the default.
+fn or_default<'de, D, T>(from: D) -> Result<T, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + Default,
+{
+    Ok(Option::deserialize(from)?.unwrap_or_default())
 }
 
 impl CellRow {
@@ -52,7 +61,7 @@ pub struct TableError(#[from] csv::Error);
 /// # Errors
 /// [`TableError`] with the row where it is not such a table.
 pub fn read_cells(from: impl io::Read) -> Result<Vec<CellRow>, TableError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(from);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(from);
     Ok(reader.deserialize().collect::<Result<_, _>>()?)
 }
 

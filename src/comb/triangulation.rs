@@ -1,13 +1,22 @@
 //! The Delaunay triangulation of cell centres.
 
 use glam::DVec2;
-use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+use spade::{DelaunayTriangulation, HasPosition, HierarchyHintGenerator, Point2, Triangulation as _};
+
+/// A triangulation in which a place is found in O(log n).
+type Triangulated = DelaunayTriangulation<Centre, (), (), (), HierarchyHintGenerator<f64>>;
 
 /// A centre in the triangulation, with its place in the list that it came from.
 #[derive(Clone, Copy)]
 struct Centre {
     position: Point2<f64>,
     index: usize,
+}
+
+impl Centre {
+    const fn new(position: DVec2, index: usize) -> Self {
+        Self { position: Point2 { x: position.x, y: position.y }, index }
+    }
 }
 
 impl HasPosition for Centre {
@@ -35,51 +44,54 @@ impl Edge {
 }
 
 /// Triangles between points, and who is opposite whom across each edge.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Delaunay {
-    /// Triples of indices.
-    pub(crate) triangles: Vec<[usize; 3]>,
-    /// All edges, in ascending order of their ends.
-    pub(crate) edges: Vec<Edge>,
+    triangulation: Triangulated,
+    count: usize,
 }
 
 impl Delaunay {
     /// Triangulates; coincident or non-finite points stay out.
     pub(crate) fn of(points: &[DVec2]) -> Self {
-        let centres = points
-            .iter()
-            .enumerate()
-            .filter(|(_, p)| p.is_finite())
-            .map(|(index, p)| Centre { position: Point2::new(p.x, p.y), index })
-            .collect();
-        let Ok(triangulation) = DelaunayTriangulation::<Centre>::bulk_load_stable(centres) else {
-            return Self::default();
+        let centres = points.iter().enumerate().filter(|(_, p)| p.is_finite());
+        let centres = centres.map(|(index, point)| Centre::new(*point, index)).collect();
+        let triangulation = Triangulated::bulk_load_stable(centres).unwrap_or_default();
+        Self { triangulation, count: points.len() }
+    }
+
+    /// Adds a point, whose index is the number of those before it; one that coincides with another takes its place.
+    pub(crate) fn add(&mut self, point: DVec2) {
+        // What cannot be inserted stays out, as in `of`.
+        let _ = self.triangulation.insert(Centre::new(point, self.count));
+        self.count += 1;
+    }
+
+    /// Triples of indices.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
+        self.triangulation.inner_faces().map(|face| face.vertices().map(|vertex| vertex.data().index))
+    }
+
+    /// All edges, in ascending order of their ends.
+    pub(crate) fn edges(&self) -> Vec<Edge> {
+        let edge_of = |edge: spade::handles::UndirectedEdgeHandle<'_, Centre, (), (), ()>| {
+            let [a, b] = edge.vertices().map(|vertex| vertex.data().index);
+            let third = |side: spade::handles::DirectedEdgeHandle<'_, Centre, (), (), ()>| {
+                side.opposite_vertex().map(|vertex| vertex.data().index)
+            };
+            let side = edge.as_directed();
+            Edge { ends: (a.min(b), a.max(b)), thirds: [third(side), third(side.rev())] }
         };
-        let triangles: Vec<[usize; 3]> = triangulation
-            .inner_faces()
-            .map(|face| face.vertices().map(|vertex| vertex.data().index))
-            .collect();
-        let mut edges: Vec<Edge> = triangulation
-            .undirected_edges()
-            .map(|edge| {
-                let [a, b] = edge.vertices().map(|vertex| vertex.data().index);
-                let third = |side: spade::handles::DirectedEdgeHandle<'_, Centre, (), (), ()>| {
-                    side.opposite_vertex().map(|vertex| vertex.data().index)
-                };
-                let side = edge.as_directed();
-                Edge { ends: (a.min(b), a.max(b)), thirds: [third(side), third(side.rev())] }
-            })
-            .collect();
+        let mut edges: Vec<Edge> = self.triangulation.undirected_edges().map(edge_of).collect();
         edges.sort_unstable_by_key(|edge| edge.ends);
-        Self { triangles, edges }
+        edges
     }
 
     /// Neighbours of every point, in ascending order.
-    pub(crate) fn neighbours(&self, count: usize) -> Vec<Vec<usize>> {
-        let mut neighbours = vec![Vec::new(); count];
-        for Edge { ends: (a, b), .. } in &self.edges {
-            neighbours[*a].push(*b);
-            neighbours[*b].push(*a);
+    pub(crate) fn neighbours(&self) -> Vec<Vec<usize>> {
+        let mut neighbours = vec![Vec::new(); self.count];
+        for Edge { ends: (a, b), .. } in self.edges() {
+            neighbours[a].push(b);
+            neighbours[b].push(a);
         }
         neighbours.iter_mut().for_each(|list| list.sort_unstable());
         neighbours

@@ -16,12 +16,14 @@ use std::ops::Range;
 
 /// Radius of a marker, in pitches: inside any cell, and wide enough to cover a glint at its centre.
 const MARKER_RADIUS: f64 = 0.16;
+/// Radius of a marker that a person has set: most of a cell, whatever fills it.
+const MARKER_BY_HAND: f64 = 0.4;
 /// A cell ends this far from its marker, in pitches: corners of a regular cell are at 0.58.
 pub(crate) const REACH: f64 = 0.95;
 /// Longest edge of a tile in pixels, without its margin: such a tile stays in a processor's cache.
 const TILE: usize = 448;
 /// Overlap of tiles, in pitches: the reach of a cell and the radius of a marker.
-const MARGIN: f64 = 1.2;
+const MARGIN: f64 = 1.3;
 /// A pixel that nothing has flooded yet, and one that nothing can flood.
 const DRY: u16 = u16::MAX - 1;
 const BARRIER: u16 = u16::MAX;
@@ -56,10 +58,10 @@ impl Segmentation {
         (label != Self::NONE).then_some(label as usize)
     }
 
-    /// Gives every pixel of cell `i` to cell `into[i]`.
-    pub(crate) fn relabel(&mut self, into: &[usize]) {
+    /// Gives every pixel of cell `i` to cell `into[i]`, or to none.
+    pub(crate) fn relabel(&mut self, into: &[Option<usize>]) {
         for label in self.labels.iter_mut().filter(|l| **l != Self::NONE) {
-            *label = crate::index::checked_u32(into[*label as usize]);
+            *label = into[*label as usize].map_or(Self::NONE, crate::index::checked_u32);
         }
     }
 
@@ -74,18 +76,30 @@ impl Segmentation {
     }
 }
 
-/// Floods `relief` from discs around the markers; `pitches` are the local pitches of the markers;
-/// where `hidden` holds, nothing floods.
-pub(crate) fn flood(
-    relief: &Plane,
-    markers: &[DVec2],
-    pitches: &[f64],
-    hidden: Option<&[bool]>,
-) -> Segmentation {
+/// Where a flood begins.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Marker {
+    /// Centre of a disc.
+    pub(crate) centre: DVec2,
+    /// Local pitch.
+    pub(crate) pitch: f64,
+    /// Whether a person has set it.
+    pub(crate) by_hand: bool,
+}
+
+impl Marker {
+    fn radius(&self) -> f64 {
+        self.pitch * if self.by_hand { MARKER_BY_HAND } else { MARKER_RADIUS }
+    }
+}
+
+/// Floods `relief` from discs around the markers; where `hidden` holds, nothing floods.
+pub(crate) fn flood(relief: &Plane, markers: &[Marker], hidden: Option<&[bool]>) -> Segmentation {
     let (width, height) = (relief.width(), relief.height());
     let mut labels = vec![Segmentation::NONE; width * height];
-    let margin = pixels(MARGIN * pitches.iter().copied().fold(0.0, f64::max));
-    let ground = Ground { relief, markers, pitches, hidden, pitch: median(pitches.iter().copied()).max(1.0) };
+    let pitches = || markers.iter().map(|marker| marker.pitch);
+    let margin = pixels(MARGIN * pitches().fold(0.0, f64::max));
+    let ground = Ground { relief, markers, hidden, pitch: median(pitches()).max(1.0) };
     let (columns, rows) = (cores(width), cores(height));
     let mut rest = labels.as_mut_slice();
     let mut bands = Vec::with_capacity(rows.len());
@@ -130,8 +144,7 @@ fn widened(range: &Range<usize>, margin: usize, size: usize) -> Range<usize> {
 
 struct Ground<'a> {
     relief: &'a Plane,
-    markers: &'a [DVec2],
-    pitches: &'a [f64],
+    markers: &'a [Marker],
     hidden: Option<&'a [bool]>,
     pitch: f64,
 }
@@ -199,14 +212,14 @@ impl Ground<'_> {
         let corner = DVec2::new(tile.columns.start as f64, tile.rows.start as f64);
         let limit = DVec2::new(width as f64, height as f64);
         let mut sources = Vec::new();
-        for (label, (centre, pitch)) in self.markers.iter().zip(self.pitches).enumerate() {
-            let (at, radius) = (*centre - corner, MARKER_RADIUS * pitch);
+        for (label, marker) in self.markers.iter().enumerate() {
+            let (at, radius) = (marker.centre - corner, marker.radius());
             if at.cmplt(DVec2::splat(-radius)).any() || at.cmpgt(limit + radius).any() {
                 continue;
             }
             let owner = u16::try_from(sources.len()).unwrap_or(BARRIER);
             let label = crate::index::checked_u32(label);
-            sources.push(Source { label, centre: at + 1.0, squared_reach: (REACH * pitch).powi(2) });
+            sources.push(Source { label, centre: at + 1.0, squared_reach: (REACH * marker.pitch).powi(2) });
             for index in disc(at, radius, width, height) {
                 let (x, y) = (index % width + 1, index / width + 1);
                 let place = y * (width + 2) + x;

@@ -22,7 +22,7 @@
 //! independent cells and on patterns with pairs and chains.
 //!
 //! **Which curvature.** Charge is set against plain ∫K dA. Where the cells' density ρ varies, an ordered arrangement follows
-//! K − ½∇² ln ρ instead (A. Mughal and D. Weaire, Phys. Rev. E 80, 2009, for conformal crystals), and a foam of film height h balances
+//! K − ½∇² ln ρ instead (A. Mughal and D. Weaire, Proc. R. Soc. A 465, 2009, for conformal patterns), and a foam of film height h balances
 //! pressures on K − ∇² ln h (`foam::audit`). Neither is subtracted: ρ would have to be measured from the areas of cells, but a seven
 //! is larger than a five, so that the charge would be set against itself; and cells of equal volume, foam's, crowd where the gap is
 //! wide while bees' keep their width, which is one of the differences that are looked for. Between parallel walls h is constant and

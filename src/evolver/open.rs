@@ -20,7 +20,7 @@ pub struct Document {
     pub data: Datafile,
     /// The surface that it describes.
     pub surface: Surface,
-    /// Its `read` section.
+    /// What its definitions ask for, and its `read` section.
     pub commands: Vec<Statement>,
     /// What is wrong with the surface.
     pub faults: Vec<Fault>,
@@ -32,9 +32,10 @@ impl Document {
     /// # Errors
     /// [`EvolverError`] with the place of what is wrong or not supported.
     pub fn new(source: &Arc<Source>) -> Result<Self, EvolverError> {
-        let (data, mut cursor) = Datafile::read(source)?;
+        let (mut data, mut cursor) = Datafile::read(source)?;
         let surface = Surface::new(&data)?;
-        let commands = statements(&mut cursor)?;
+        let mut commands = std::mem::take(&mut data.prelude);
+        commands.extend(statements(&mut cursor)?);
         let faults = check(&data, &surface);
         Ok(Self { data, surface, commands, faults })
     }

@@ -21,6 +21,11 @@ pub enum WriteError {
         "parallel walls of a periodic surface have no closed formula that a datafile could hold; make the foam between level sets (--delta)"
     )]
     NoFormula,
+    /// Planes that cut the gap off.
+    #[error(
+        "a foam that ends at plane walls cannot be written as a datafile yet; make it periodic (--open-faces periodic, a whole cell)"
+    )]
+    CutOff,
     /// An edge over more than one period.
     #[error("an edge reaches over more than one period; a datafile's wraps are +, - and *: use more cells")]
     LongEdge,
@@ -62,6 +67,9 @@ pub fn foam_datafile(
     places: &Places,
     title: &str,
 ) -> Result<String, WriteError> {
+    if complex.walls.iter().any(|wall| wall.field.cuts_off()) {
+        return Err(WriteError::CutOff);
+    }
     let head = head(space, complex, places, title)?;
     let mut writer = Writer {
         complex,
@@ -134,6 +142,7 @@ fn head(space: &FoamSpace, complex: &Complex, places: &Places, title: &str) -> R
                 push(format!("CONSTRAINT {}\nFORMULA: {formula}", wall + 1));
             }
         }
+        FoamSpace::Piece { .. } | FoamSpace::Box { .. } => return Err(WriteError::CutOff),
         FoamSpace::Plane { .. } => {
             for wall in 0..complex.walls.len() {
                 push(format!("PARAMETER height{} = {}", wall + 1, level(wall)));

@@ -33,15 +33,16 @@ const BANDS: u32 = 4;
 /// Below this signal, in radians, cells count as alike.
 const ALIKE: f64 = 1e-6;
 
-/// The audit of a foam between the walls of `gap`.
+/// The audit of a foam between the walls of `gap`. Cells that planes cut off are left out: the law needs all their sides.
 #[must_use]
 pub fn audit(state: &State, gap: &Gap) -> Audit {
     let pairs: Vec<(f64, f64)> = state
         .network
         .cells()
+        .filter(|&cell| !state.network.is_cut(cell))
         .map(|cell| (curvature_side(state, gap, cell), pressure_side(state, cell)))
         .collect();
-    let count = f64::from(crate::index::checked_u32(pairs.len()));
+    let count = f64::from(crate::index::checked_u32(pairs.len().max(1)));
     let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / count;
     let (mx, my) = (mean(&|p| p.0), mean(&|p| p.1));
     let (xx, yy) = (mean(&|p| (p.0 - mx).powi(2)), mean(&|p| (p.1 - my).powi(2)));

@@ -174,7 +174,7 @@ mod tests {
         let mut seeds = SeedSettings::new(14, 1);
         seeds.anneal.sweeps = 100;
         let start = start(&gap, &domain, &seeds, &mut |_| ControlFlow::Continue(()))?;
-        let network = start.network.ok_or("no network")?;
+        let network = start.network;
         let settings = RelaxSettings::default();
         let relaxed = relax(network, &gap, &settings, &mut |progress| {
             if progress.state.steps < 1 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }

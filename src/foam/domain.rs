@@ -5,7 +5,7 @@
 //! therefore groups of [`Image`]s: an optional reflection at the low end, then a whole number of translations.
 
 use super::convert::whole;
-use crate::surface::{LevelSet, Period};
+use crate::surface::{CutPlane, LevelSet, Period};
 use glam::{BVec3, DVec3, IVec3};
 use serde::{Deserialize, Serialize};
 
@@ -214,6 +214,43 @@ impl Domain {
         })
     }
 
+    /// The plane wall at one end of an axis.
+    #[must_use]
+    pub fn cut_plane(&self, axis: u8, high: bool) -> CutPlane {
+        let end = self.axes[usize::from(axis)];
+        let at = if high { end.low() + end.length() } else { end.low() };
+        CutPlane { axis, at, keeps_above: !high }
+    }
+
+    /// All plane walls.
+    #[must_use]
+    pub fn cut_planes(&self) -> Vec<CutPlane> {
+        let walled = (0_u8..).zip(&self.axes).filter(|(_, axis)| matches!(axis, Axis::Walls { .. }));
+        walled.flat_map(|(axis, _)| [false, true].map(|high| self.cut_plane(axis, high))).collect()
+    }
+
+    /// `point` reflected at the plane walls until it lies between them.
+    #[must_use]
+    pub fn reflected_inside(&self, mut point: DVec3) -> DVec3 {
+        for (index, axis) in self.axes.iter().enumerate() {
+            if let Axis::Walls { low, high } = *axis {
+                let turn = 2.0 * (high - low);
+                let along = (point[index] - low).rem_euclid(turn);
+                point[index] = low + along.min(turn - along);
+            }
+        }
+        point
+    }
+
+    /// How many periods of a surface the primary box holds: a whole number where it is periodic, halves between mirror planes.
+    #[must_use]
+    pub fn periods_of(&self, surface: &dyn LevelSet) -> f64 {
+        let Period(periods) = surface.period();
+        let along =
+            |(axis, period): (&Axis, Option<f64>)| period.map_or(1.0, |period| axis.length() / period);
+        self.axes.iter().zip(periods).map(along).product()
+    }
+
     /// Whether any axis ends in plane walls.
     #[must_use]
     pub fn has_walls(&self) -> bool {
@@ -262,6 +299,15 @@ mod tests {
             let (inside, image) = domain.wrap(point);
             assert!((0.0..1.5).contains(&inside.x), "{inside}");
             assert!(domain.apply(image, inside).distance(point) < 1e-14);
+        }
+    }
+
+    #[test]
+    fn what_is_reflected_lies_inside() {
+        let domain = mixed();
+        for (y, inside) in [(0.3, 0.3), (-0.35, -0.15), (0.8, 0.7), (1.85, -0.15), (-1.3, 0.7)] {
+            let point = domain.reflected_inside(DVec3::new(9.0, y, 0.0));
+            assert!((point.y - inside).abs() < 1e-14 && point.x > 8.0, "{y}: {point}");
         }
     }
 

@@ -22,8 +22,11 @@
 //! Not promised: a relaxed foam is a local minimum; other seeds may lie lower, and annealing (`relax/anneal.rs`) finds some of
 //! them. Energies are those of the mesh: their error falls with the fourth power of the number of elements along a film, is
 //! 1e-5 with the default on a foam of 64 cells, and can be extrapolated away. Networks have three cells at every vertex and
-//! three sides or more, so that a sphere needs four cells. Relaxation knows periodic and closed surfaces only, not plane walls
-//! across the gap: a foam of an enclosure fills one whole period of its gap, not the half that is printed.
+//! three sides or more, so that a sphere needs four cells.
+//!
+//! Where planes of mirror symmetry cut the gap off, as at the open faces of an enclosure, they are frictionless walls: films
+//! end on them at a right angle, and cells at them are cut (`network/rim.rs`, `complex/rim.rs`, `topology.rs`). A cell there
+//! may cover one corner of the box and end at planes that do not face each other; too few cells for that are refused.
 //!
 //! One layer means that cells have the same neighbours on both walls. Where walls are far apart for their curvature there is
 //! no such foam: on the P-surface beyond about Φ = ±0.7, where a film is squeezed to nothing on the inner side of a neck while

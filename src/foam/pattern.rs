@@ -55,17 +55,21 @@ pub fn pattern_of_state(
     };
     let cell = |id| {
         let (position, surface) = placed(network.centre(id), gap, place);
-        let walls = network.ring(id).map(|side| CellWall {
-            neighbour: Some(CellId::from_index(network.neighbour(side).index())),
-            shift: network.neighbour_shift(side),
-            length: length(&state.side_line(side, row), &state.side_line(network.next(side), row)),
+        let walls = network.ring(id).map(|side| {
+            let across = Some(network.neighbour(side)).filter(|&cell| !network.is_outside(cell));
+            CellWall {
+                neighbour: across.map(|cell| CellId::from_index(cell.index())),
+                shift: across.map_or(glam::IVec3::ZERO, |_| network.neighbour_shift(side)),
+                length: length(&state.side_line(side, row), &state.side_line(network.next(side), row)),
+            }
         });
         let walls: Vec<CellWall> = walls.collect();
+        let (sides, status) = counted(&walls);
         Cell {
             position,
             normal: surface.normal(position),
-            sides: u32::try_from(walls.len()).ok(),
-            status: CellStatus::Complete,
+            sides,
+            status,
             confidence: 1.0,
             area: fan_area(position, &state.outline_at(id, row)),
             gauss_curvature: Some(surface.curvature(position).gauss),
@@ -73,11 +77,22 @@ pub fn pattern_of_state(
         }
     };
     let cells: IndexVec<CellId, Cell> = network.cells().map(cell).collect();
-    CellPattern::new(
-        "L",
-        Surroundings::Closed { euler_characteristic: network.euler_characteristic() },
-        cells,
-    )
+    let surroundings = if network.planes().is_empty() {
+        Surroundings::Closed { euler_characteristic: network.euler_characteristic() }
+    } else {
+        Surroundings::Open
+    };
+    CellPattern::new("L", surroundings, cells)
+}
+
+/// The number of sides and the status of a cell with these walls. One that ends at a plane is cut, like a cell at the edge of
+/// a photograph: how many sides the rest of it would have is not known.
+fn counted(walls: &[CellWall]) -> (Option<u32>, CellStatus) {
+    if walls.iter().any(|wall| wall.neighbour.is_none()) {
+        (None, CellStatus::Cut)
+    } else {
+        (Some(crate::index::checked_u32(walls.len())), CellStatus::Complete)
+    }
 }
 
 /// The foot of `centre` on the surface that the pattern lies on, and that surface.
@@ -113,20 +128,20 @@ fn surroundings(gap: &Gap, domain: &Domain) -> Surroundings {
 
 fn pattern_cell(cell: &PartitionCell, gap: &Gap, place: PatternPlace) -> Cell {
     let none = Vec::new();
-    let sides = match place {
+    let outline = match place {
         PatternPlace::Middle => cell.sections.first().unwrap_or(&none),
         PatternPlace::Wall(wall) => &cell.on_walls[wall as usize],
     };
     let (position, surface) = placed(cell.seed, gap, place);
-    let walls: Vec<CellWall> = sides.iter().map(pattern_wall).collect();
-    let cut = walls.iter().any(|wall| wall.neighbour.is_none());
+    let walls: Vec<CellWall> = outline.iter().map(pattern_wall).collect();
+    let (sides, status) = counted(&walls);
     Cell {
         position,
         normal: surface.normal(position),
-        sides: (!cut).then(|| u32::try_from(walls.len()).unwrap_or(u32::MAX)),
-        status: if cut { CellStatus::Cut } else { CellStatus::Complete },
+        sides,
+        status,
         confidence: 1.0,
-        area: fan_area(position, &sides.iter().map(|side| side.start).collect::<Vec<_>>()),
+        area: fan_area(position, &outline.iter().map(|side| side.start).collect::<Vec<_>>()),
         gauss_curvature: Some(surface.curvature(position).gauss),
         walls,
     }

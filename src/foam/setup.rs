@@ -1,6 +1,6 @@
 //! What a foam is made in: a surface, its two walls and how space ends, as plain numbers that a file can keep.
 
-use super::domain::Domain;
+use super::domain::{Axis, Domain};
 use crate::{
     surface::{Diamond, Gap, GapError, Gyroid, LevelSet, Plane, SchwarzP, Sphere, Torus},
     units::LevelOffset,
@@ -36,6 +36,16 @@ pub enum PeriodicWalls {
     },
 }
 
+/// How a foam ends at the open faces of an enclosure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OpenFaces {
+    /// At frictionless plane walls: films meet them at a right angle.
+    Walls,
+    /// Where two faces are whole periods apart, it goes on periodically; at frictionless walls elsewhere.
+    Periodic,
+}
+
 /// The space that a foam fills.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "surface", rename_all = "kebab-case")]
@@ -65,6 +75,26 @@ pub enum FoamSpace {
     Plane {
         /// The periods.
         periods: [f64; 2],
+        /// The distance of the planes.
+        height: f64,
+    },
+    /// A box of half periods of the gap round Schwarz' P, cut off by planes of mirror symmetry, as an enclosure is printed.
+    Piece {
+        /// The period; lengths of the foam are in its unit.
+        period: f64,
+        /// The walls.
+        walls: PeriodicWalls,
+        /// The lower corner of the box, in half periods.
+        low: [i32; 3],
+        /// Its upper corner.
+        high: [i32; 3],
+        /// What the foam meets at its faces.
+        open_faces: OpenFaces,
+    },
+    /// The slab between two planes in a box with frictionless plane walls.
+    Box {
+        /// The box's sides along x and y.
+        sides: [f64; 2],
         /// The distance of the planes.
         height: f64,
     },
@@ -100,6 +130,16 @@ pub enum SpaceError {
         outer: f64,
         /// The radius of the centre circle.
         ring: f64,
+    },
+    /// A box without room.
+    #[error(
+        "the piece from {low:?} to {high:?} half periods has no room: each upper end must exceed the lower"
+    )]
+    NoRoom {
+        /// The lower corner.
+        low: [i32; 3],
+        /// The upper corner.
+        high: [i32; 3],
     },
     /// The walls do not exist.
     #[error(transparent)]
@@ -140,6 +180,13 @@ impl FoamSpace {
                 positive("height", height)?;
                 Ok(Gap::between(Arc::new(Plane { periods }), [-0.5 * height, 0.5 * height])?)
             }
+            Self::Box { sides, height } => Self::Plane { periods: sides, height }.gap(),
+            Self::Piece { period, walls, low, high, .. } => {
+                if (0..3).any(|axis| low[axis] >= high[axis]) {
+                    return Err(SpaceError::NoRoom { low, high });
+                }
+                Self::Periodic { kind: PeriodicSurface::SchwarzP, period, walls }.gap()
+            }
         }
     }
 
@@ -154,24 +201,62 @@ impl FoamSpace {
             // Exactly as it was typed, without the rounding of means.
             whole if part >= 1.0 => whole,
             Self::Periodic { kind, period, walls } => {
-                let walls = match walls {
-                    PeriodicWalls::LevelSet { delta } => PeriodicWalls::LevelSet { delta: part * delta },
-                    PeriodicWalls::Parallel { gap } => PeriodicWalls::Parallel { gap: part * gap },
-                };
-                Self::Periodic { kind, period, walls }
+                Self::Periodic { kind, period, walls: walls.narrowed(part) }
             }
+            Self::Piece { period, walls, low, high, open_faces } => {
+                Self::Piece { period, walls: walls.narrowed(part), low, high, open_faces }
+            }
+            Self::Box { sides, height } => Self::Box { sides, height: part * height },
             Self::Sphere { radii: both } => Self::Sphere { radii: radii(both) },
             Self::Torus { ring, tubes } => Self::Torus { ring, tubes: radii(tubes) },
             Self::Plane { periods, height } => Self::Plane { periods, height: part * height },
         }
     }
 
-    /// How space ends: one period, or open round a bounded gap.
+    /// How space ends: one period, a box of plane walls, or open round a bounded gap.
     ///
     /// # Errors
     /// As [`FoamSpace::gap`].
     pub fn domain(&self) -> Result<Domain, SpaceError> {
-        Ok(Domain::of_surface(self.gap()?.middle().as_ref()))
+        let mut domain = Domain::of_surface(self.gap()?.middle().as_ref());
+        match *self {
+            Self::Box { sides: [x, y], .. } => {
+                domain.axes[0] = Axis::Walls { low: 0.0, high: x };
+                domain.axes[1] = Axis::Walls { low: 0.0, high: y };
+            }
+            Self::Piece { period, low, high, open_faces, .. } => {
+                for (index, axis) in domain.axes.iter_mut().enumerate() {
+                    let [low, high] = [low[index], high[index]];
+                    let at = |halves: i32| 0.5 * period * f64::from(halves);
+                    *axis = if open_faces == OpenFaces::Periodic && (high - low) % 2 == 0 {
+                        Axis::Periodic { low: at(low), length: at(high - low) }
+                    } else {
+                        Axis::Walls { low: at(low), high: at(high) }
+                    };
+                }
+            }
+            _ => {}
+        }
+        Ok(domain)
+    }
+}
+
+impl PeriodicWalls {
+    /// The same walls nearer to the middle surface.
+    fn narrowed(self, part: f64) -> Self {
+        match self {
+            Self::LevelSet { delta } => Self::LevelSet { delta: part * delta },
+            Self::Parallel { gap } => Self::Parallel { gap: part * gap },
+        }
+    }
+}
+
+impl fmt::Display for PeriodicWalls {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LevelSet { delta } => write!(f, "walls Φ = ±{delta}"),
+            Self::Parallel { gap } => write!(f, "parallel walls, gap {gap}"),
+        }
     }
 }
 
@@ -194,12 +279,17 @@ impl fmt::Display for FoamSpace {
                     PeriodicSurface::Gyroid => "gyroid",
                     PeriodicSurface::Diamond => "diamond",
                 };
-                write!(f, "{name}, period {period}, ")?;
-                match walls {
-                    PeriodicWalls::LevelSet { delta } => write!(f, "walls Φ = ±{delta}"),
-                    PeriodicWalls::Parallel { gap } => write!(f, "parallel walls, gap {gap}"),
-                }
+                write!(f, "{name}, period {period}, {walls}")
             }
+            Self::Piece { period, walls, low, high, open_faces } => {
+                let [x, y, z] = [0, 1, 2].map(|axis| 0.5 * f64::from(high[axis] - low[axis]));
+                let faces = match open_faces {
+                    OpenFaces::Walls => "closed by plane walls",
+                    OpenFaces::Periodic => "periodic where it can be",
+                };
+                write!(f, "Schwarz P, {x} × {y} × {z} periods of {period}, {faces}; {walls}")
+            }
+            Self::Box { sides: [x, y], height } => write!(f, "planes {height} apart in a box of {x} × {y}"),
             Self::Sphere { radii: [inner, outer] } => write!(f, "spheres of radius {inner} and {outer}"),
             Self::Torus { ring, tubes: [inner, outer] } => {
                 write!(f, "tori of ring {ring}, tubes {inner} and {outer}")
@@ -256,6 +346,14 @@ mod tests {
             FoamSpace::Periodic { kind, period: 1.0, walls: PeriodicWalls::LevelSet { delta: 1.0 } },
             FoamSpace::Periodic { kind, period: -1.0, walls: PeriodicWalls::LevelSet { delta: 0.2 } },
             FoamSpace::Periodic { kind, period: 1.0, walls: PeriodicWalls::Parallel { gap: 0.5 } },
+            FoamSpace::Box { sides: [1.0, -1.0], height: 0.5 },
+            FoamSpace::Piece {
+                period: 1.0,
+                walls: PeriodicWalls::LevelSet { delta: 0.2 },
+                low: [0, 0, 2],
+                high: [2, 2, 2],
+                open_faces: OpenFaces::Walls,
+            },
         ] {
             assert!(space.gap().is_err(), "{space}");
         }

@@ -18,8 +18,8 @@ pub struct Start {
     pub seeds: Seeds,
     /// Their cells.
     pub partition: Partition,
-    /// The network of the cells on the middle surface; none where the domain has plane walls.
-    pub network: Option<Network>,
+    /// The network of the cells on the middle surface.
+    pub network: Network,
     /// What was wrong with each earlier draw of seeds.
     pub rejected: Vec<Vec<PartitionDefect>>,
 }
@@ -64,7 +64,7 @@ pub fn start(
     Err(StartError::Unsound { attempts: ATTEMPTS, cells: settings.count, defects })
 }
 
-type Divided = (Seeds, Partition, Option<Network>);
+type Divided = (Seeds, Partition, Network);
 
 /// The partition after the Lloyd steps, and its network.
 fn divided(
@@ -78,7 +78,7 @@ fn divided(
         seeds.points = partition.centred_seeds(gap);
         partition = Partition::new(gap, domain, &seeds.points)?;
     }
-    let network = if domain.has_walls() { None } else { Some(partition.network()?) };
+    let network = partition.network()?;
     Ok((seeds, partition, network))
 }
 

@@ -2,12 +2,19 @@
 //!
 //! An edge flips when it is shorter than a part of the cell width. Each flip of an edge lowers the part for that edge, and
 //! the new edge is laid longer than the threshold: so no edge flips back and forth for ever.
+//!
+//! At a plane that cuts the gap off the same T1 takes a film off the plane or lays a cell against it: an edge of the rim
+//! (`network/rim.rs`) becomes a film or a film one of the rim. A film that slides round a corner between two planes changes
+//! from one to the other.
 
 use super::{
     network::{EdgeId, HalfEdgeId, Network, VertexId},
     relax::State,
 };
-use crate::{index::IndexVec, surface::Gap};
+use crate::{
+    index::IndexVec,
+    surface::{CutPlane, Gap, LevelSet},
+};
 use glam::DVec3;
 
 /// By how much each flip of an edge lowers its threshold.
@@ -79,7 +86,9 @@ pub fn draw_apart(network: &mut Network, gap: &Gap) {
                 let here = network.position(vertex);
                 let pull: DVec3 = network.outgoing(vertex).map(|side| network.edge_vector(side) / 3.0).sum();
                 let level = gap.middle().value(here);
-                (vertex, gap.middle().project(here + PART * pull, level).unwrap_or(here))
+                let there = gap.middle().project(here + PART * pull, level).unwrap_or(here);
+                let plane = network.plane_of(vertex).map(|place| network.planes()[place]);
+                (vertex, plane.map_or(there, |plane| plane.nearest_to(there)))
             })
             .collect();
         for (vertex, place) in moved {
@@ -122,36 +131,119 @@ fn new_length(state: &State, edge: EdgeId) -> f64 {
 fn flip_in_place(state: &mut State, gap: &Gap, edge: EdgeId) -> Option<()> {
     let (start, end) = state.chord(edge);
     let length = new_length(state, edge);
+    let [first, second] = edge.half_edges().map(|side| end_plane(&state.network, state.network.origin(side)));
+    let plane = first.or(second);
     state.network.flip(edge).ok()?;
-    let side = edge.half_edges()[0];
-    let (u, v) = (state.network.origin(side), state.network.target(side));
-    let far = state.network.period().translation(state.network.target_shift(side));
-    let middle = 0.5 * (start + end);
-    // Across the middle surface from the neighbours of the one new corner to those of the other: the old edge is too short
-    // to say where to turn.
-    let neighbours = |vertex: VertexId, frame: DVec3| -> DVec3 {
-        let others = state.network.outgoing(vertex).filter(|&side| side.edge() != edge);
-        others
-            .map(|side| 0.5 * (state.network.position(vertex) + state.network.edge_vector(side) + frame))
-            .sum()
+    let [u, v] = edge.half_edges().map(|side| state.network.origin(side));
+    // On a plane it lies where the old edge ended.
+    let middle = match (first, second) {
+        (None, Some(_)) => end,
+        (Some(_), None) => start,
+        (None, None) => 0.5 * (start + end),
+        (Some(plane), Some(_)) => plane.nearest_to(0.5 * (start + end)),
     };
-    let across = neighbours(u, DVec3::ZERO) - neighbours(v, far);
-    let up = gap.middle().normal(middle);
-    let left = (across - across.dot(up) * up).normalize_or(up.any_orthonormal_vector());
-    let half = 0.5 * length;
-    state.network.set_position(u, middle + half * left);
-    state.network.set_position(v, middle - half * left - far);
-    for vertex in [u, v] {
-        state.strips.lay_column(&state.network, gap, vertex, &mut state.places).ok()?;
+    let far = state.network.period().translation(state.network.target_shift(edge.half_edges()[0]));
+    let [to_u, to_v] = match plane {
+        None => {
+            let left = across(&state.network, gap, edge, middle);
+            [0.5 * length * left, -0.5 * length * left]
+        }
+        Some(plane) => along_or_off(&state.network, gap, edge, plane, middle).map(|way| length * way),
+    };
+    for (vertex, place) in [(u, middle + to_u), (v, middle + to_v - far)] {
+        let ends = end_plane(&state.network, vertex).and(plane);
+        state.network.set_position(vertex, ends.map_or(place, |plane| plane.nearest_to(place)));
     }
-    let touched: Vec<EdgeId> = [u, v]
-        .into_iter()
-        .flat_map(|w| state.network.outgoing(w).map(|side| side.edge()).collect::<Vec<_>>())
-        .collect();
-    for edge in touched {
-        state.strips.lay_film(&state.network, gap, edge, &mut state.places).ok()?;
+    let cells =
+        [u, v].map(|w| state.network.outgoing(w).map(|side| state.network.cell(side)).collect::<Vec<_>>());
+    if cells.iter().flatten().any(|&cell| !state.network.is_outside(cell) && state.network.spans(cell)) {
+        return None;
     }
+    lay_round(state, gap, &[u, v])?;
     state.flips += 1;
     state.flips_of_edge[edge] += 1;
     Some(())
+}
+
+/// The plane on which a film ends at `vertex`.
+fn end_plane(network: &Network, vertex: VertexId) -> Option<CutPlane> {
+    network.plane_of(vertex).map(|place| network.planes()[place])
+}
+
+/// The direction from the middle of a flipped edge to its origin: across the middle surface from the neighbours of the one
+/// new corner to those of the other, since the old edge is too short to say where to turn.
+fn across(network: &Network, gap: &Gap, edge: EdgeId, middle: DVec3) -> DVec3 {
+    let side = edge.half_edges()[0];
+    let far = network.period().translation(network.target_shift(side));
+    let neighbours = |vertex: VertexId, frame: DVec3| -> DVec3 {
+        let others = network.outgoing(vertex).filter(|&side| side.edge() != edge);
+        others.map(|side| 0.5 * (network.position(vertex) + network.edge_vector(side) + frame)).sum()
+    };
+    let across = neighbours(network.origin(side), DVec3::ZERO) - neighbours(network.target(side), far);
+    let up = gap.middle().normal(middle);
+    (across - across.dot(up) * up).normalize_or(up.any_orthonormal_vector())
+}
+
+/// From where an edge that was flipped at `plane` met it to its origin and to its target, in lengths of the edge: along the
+/// plane to both sides if it lies on the rim now, and off the plane with one end if it is a film.
+fn along_or_off(network: &Network, gap: &Gap, edge: EdgeId, plane: CutPlane, at: DVec3) -> [DVec3; 2] {
+    let up = gap.middle().normal(at);
+    if network.is_rim(edge) {
+        let way = across(network, gap, edge, at);
+        let along = up.cross(plane.inward()).normalize_or(up.any_orthonormal_vector());
+        let along = if along.dot(way) < 0.0 { -along } else { along };
+        return [0.5 * along, -0.5 * along];
+    }
+    let off = (plane.inward() - plane.inward().dot(up) * up).normalize_or(plane.inward());
+    edge.half_edges().map(|side| {
+        let ends_here = network.plane_of(network.origin(side)).is_some();
+        if ends_here { DVec3::ZERO } else { off }
+    })
+}
+
+/// Lays the columns of some vertices anew, and all films that meet them.
+fn lay_round(state: &mut State, gap: &Gap, vertices: &[VertexId]) -> Option<()> {
+    for &vertex in vertices {
+        state.strips.lay_column(&state.network, gap, vertex, &mut state.places).ok()?;
+    }
+    let edges = vertices.iter().flat_map(|&vertex| state.network.outgoing(vertex).map(HalfEdgeId::edge));
+    for edge in edges.collect::<Vec<EdgeId>>() {
+        state.strips.lay_film(&state.network, gap, edge, &mut state.places).ok()?;
+    }
+    Some(())
+}
+
+/// A film's end that has slid round a corner: it lies beyond another plane than its own by more than `margin`. Gives its
+/// vertex and that plane's place in [`Network::planes`].
+#[must_use]
+pub fn slid_round(state: &State, margin: f64) -> Option<(VertexId, usize)> {
+    let network = &state.network;
+    let ends = network.rim().flat_map(|edge| edge.half_edges().map(|side| network.origin(side)));
+    ends.into_iter().find_map(|vertex| {
+        let own = network.plane_of(vertex);
+        let place = state.places[state.middle_node(vertex)];
+        let beyond =
+            |&(other, plane): &(usize, &CutPlane)| own != Some(other) && plane.value(place) < -margin;
+        network.planes().iter().enumerate().find(beyond).map(|(other, _)| (vertex, other))
+    })
+}
+
+/// Lets the film that ends at `vertex` end on another plane, round the corner, and lays it anew. Gives whether that was done.
+pub fn turn_corner(state: &mut State, gap: &Gap, vertex: VertexId, other: usize) -> bool {
+    let before = state.clone();
+    state.follow_films();
+    let done = turn_in_place(state, gap, vertex, other).is_some();
+    if !done {
+        *state = before;
+    }
+    done
+}
+
+fn turn_in_place(state: &mut State, gap: &Gap, vertex: VertexId, other: usize) -> Option<()> {
+    let (own, next) = (end_plane(&state.network, vertex)?, state.network.planes()[other]);
+    let here = state.network.position(vertex);
+    let beside = next.nearest_to(here) + NEW_LENGTH * state.cell_width() * own.inward();
+    let place = gap.middle().project(beside, gap.middle().value(here)).ok()?;
+    state.network.set_position(vertex, next.nearest_to(place));
+    lay_round(state, gap, &[vertex])
 }

@@ -14,6 +14,9 @@ use crate::{
 use serde::Serialize;
 use std::io;
 
+/// The name of the table of cells.
+pub const CELLS: &str = "cells.csv";
+
 /// The name and version of the form of `summary.json`.
 pub const COMB_SUMMARY_SCHEMA: &str = "combwright.comb-summary/1";
 
@@ -28,6 +31,8 @@ pub struct CombSummary {
     pub width_px: usize,
     /// Its height in pixels.
     pub height_px: usize,
+    /// Pixels of `overlay.png` per pixel of the photograph.
+    pub overlay_scale: f64,
     /// Median distance of neighbouring cells in pixels.
     pub pitch_px: f64,
     /// Millimetres per pixel, if a scale is known.
@@ -104,6 +109,7 @@ pub fn summary(name: &str, comb: &Comb, scale: Option<Scale>) -> CombSummary {
         photo: name.to_owned(),
         width_px: comb.width,
         height_px: comb.height,
+        overlay_scale: comb_overlay::scale(comb),
         pitch_px: comb.pitch,
         mm_per_px,
         cells_are: if comb.polarity == Polarity::DarkCells { "dark" } else { "bright" },
@@ -156,12 +162,23 @@ pub fn write(
     photo: &Photo,
     summary: &CombSummary,
 ) -> Result<(), CombOutputError> {
+    let (overlay, tables) =
+        rayon::join(|| comb_overlay::draw(comb, photo), || write_tables(folder, comb, summary));
+    tables?;
+    folder.write_bytes("overlay.png", &overlay?)?;
+    Ok(())
+}
+
+fn write_tables(
+    folder: &mut OutputFolder,
+    comb: &Comb,
+    summary: &CombSummary,
+) -> Result<(), CombOutputError> {
     let mut table = Vec::new();
     write_cells(comb, &mut table)?;
-    folder.write_bytes("cells.csv", &table)?;
+    folder.write_bytes(CELLS, &table)?;
     folder.write_json("pattern.json", &comb.pattern)?;
     folder.write_json("cells.geojson", &outlines(comb))?;
-    folder.write_bytes("overlay.png", &comb_overlay::draw(comb, photo)?)?;
     folder.write_json("summary.json", summary)?;
     Ok(())
 }
@@ -284,12 +301,13 @@ pub fn line(summary: &CombSummary) -> String {
         .map(|(n, count)| format!("{count} of {n}"))
         .collect();
     format!(
-        "{}: {} complete cells ({} sides), {} cut, {} uncertain, {} 5-7 pairs, pitch {:.1} px",
+        "{}: {} complete cells ({} sides), {} cut, {} uncertain, {} hidden, {} 5-7 pairs, pitch {:.1} px",
         summary.photo,
         summary.sides.complete,
         if sides.is_empty() { "none of any".to_owned() } else { sides.join(", ") },
         summary.sides.cut,
-        summary.sides.uncertain,
+        summary.sides.uncertain.saturating_sub(summary.hidden),
+        summary.hidden,
         summary.pairs,
         summary.pitch_px,
     )

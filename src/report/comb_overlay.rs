@@ -1,12 +1,13 @@
 //! The overlay: the photograph with what was read from it.
 //!
-//! Outlines in the colour of the number of sides; cells that are not hexagons filled, with their number; 5–7 pairs joined;
-//! cut cells outlined in grey; doubtful ones hatched; hidden ones as a dot. The legend stands below.
+//! Complete cells are outlined in the colour of their number of sides; those that are not hexagons filled, with their number;
+//! 5–7 pairs joined; cut cells outlined in grey; uncertain ones in white and hatched; hidden ones crossed. The legend stands
+//! below.
 
 use super::{
     comb::status_name,
     figure::{Anchor, Drawing, FigureError},
-    palette::{Colour, GREY, INK, VERMILION, of_sides},
+    palette::{Colour, GREY, INK, of_sides},
 };
 use crate::{
     comb::{Comb, Photo},
@@ -18,18 +19,21 @@ use rayon::prelude::*;
 use resvg::tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, PixmapMut, Stroke, Transform};
 
 /// Pixels per cell in the overlay: a larger photograph is reduced to it, so that the file stays small enough to be opened.
-const OVERLAY_PITCH: f64 = 48.0;
+const OVERLAY_PITCH: f64 = 64.0;
 /// Rows that are drawn as one task.
 const BAND: usize = 256;
-/// Height of the legend.
+/// Height of a legend of one row, and what each further one adds.
 const LEGEND: f64 = 34.0;
+const LEGEND_ROW: f64 = 24.0;
+/// Left of the legend.
+const LEGEND_MARGIN: f64 = 8.0;
 
 /// The overlay as a PNG file.
 ///
 /// # Errors
 /// The legend cannot be drawn or the file not be encoded.
 pub(super) fn draw(comb: &Comb, photo: &Photo) -> Result<Vec<u8>, FigureError> {
-    let scale = (OVERLAY_PITCH / comb.pitch).min(1.0);
+    let scale = scale(comb);
     let [width, height] = [comb.width, comb.height].map(|length| to_u32(length as f64 * scale).max(1));
     let mut bytes = photo.scaled(width, height).into_raw();
     let defects = defects(&comb.pattern);
@@ -49,6 +53,11 @@ pub(super) fn draw(comb: &Comb, photo: &Photo) -> Result<Vec<u8>, FigureError> {
         png::PngEncoder::new_with_quality(&mut file, png::CompressionType::Fast, png::FilterType::Sub);
     encoder.write_image(&bytes, width, height + legend.height(), ExtendedColorType::Rgb8)?;
     Ok(file)
+}
+
+/// Pixels of the overlay per pixel of the photograph.
+pub(super) fn scale(comb: &Comb) -> f64 {
+    (OVERLAY_PITCH / comb.pitch).min(1.0)
 }
 
 /// A band of the overlay.
@@ -76,7 +85,7 @@ impl Overlay<'_> {
             self.pair([pair.few, pair.many].map(|id| comb.pattern.cells[id].position.truncate()));
         }
         for (_, cell) in near {
-            if cell.status != CellStatus::Cut
+            if cell.status == CellStatus::Complete
                 && let Some(sides) = cell.sides.filter(|n| *n != 6)
             {
                 self.digit(cell.position.truncate(), sides);
@@ -95,7 +104,7 @@ impl Overlay<'_> {
         if ends.iter().any(|end| self.meets(end.y)) {
             let path = self.path(&ends, false);
             self.stroke(path.as_ref(), Colour([255; 3]), 0.11, 1.0);
-            self.stroke(path.as_ref(), VERMILION, 0.06, 1.0);
+            self.stroke(path.as_ref(), INK, 0.06, 1.0);
         }
     }
 
@@ -105,8 +114,9 @@ impl Overlay<'_> {
         let inner: Vec<DVec2> = outline.iter().map(|p| centre + (*p - centre) * 0.93).collect();
         let path = self.path(&inner, true);
         let colour = match (cell.status, cell.sides) {
-            (CellStatus::Cut, _) | (_, None) => GREY,
-            (_, Some(sides)) => of_sides(sides),
+            (CellStatus::Complete, Some(sides)) => of_sides(sides),
+            (CellStatus::Uncertain, _) => Colour([255; 3]),
+            _ => GREY,
         };
         if cell.status == CellStatus::Complete
             && cell.sides != Some(6)
@@ -120,7 +130,9 @@ impl Overlay<'_> {
                 self.stroke(line.as_ref(), Colour([255; 3]), 0.03, 0.9);
             }
         }
-        let width = if cell.status == CellStatus::Cut { 0.025 } else { 0.05 };
+        // A dark rim sets the outline off from pale wax.
+        let width = if cell.status == CellStatus::Cut { 0.03 } else { 0.05 };
+        self.stroke(path.as_ref(), INK, width + 0.03, 0.6);
         self.stroke(path.as_ref(), colour, width, 0.95);
     }
 
@@ -205,43 +217,85 @@ fn strokes(digit: u32) -> Vec<Vec<(f64, f64)>> {
     }
 }
 
-fn legend(width: f64) -> Result<RgbImage, FigureError> {
-    let mut drawing = Drawing::new(width, LEGEND);
-    let mut x = 8.0;
-    let size = if width < 900.0 { 10.0 } else { 13.0 };
-    let mut entry = |swatch: &dyn Fn(&mut Drawing, f64), text: &str| {
-        swatch(&mut drawing, x);
-        drawing.text([x + 22.0, 22.0], size, Anchor::Start, INK, text);
-        x += 30.0 + size * 0.56 * text.len() as f64;
-    };
-    for (sides, text) in [(4, "4"), (5, "5"), (6, "6"), (7, "7"), (8, "8 sides")] {
-        entry(&|d, x| box_of(d, x, of_sides(sides)), text);
-    }
-    entry(&|d, x| box_of(d, x, GREY), status_name(CellStatus::Cut));
-    entry(
-        &|d, x| {
-            box_of(d, x, INK);
-            for k in 0..3 {
-                let k = f64::from(k) * 5.0;
-                d.line(&[[x + 1.0 + k, 24.0], [x + 6.0 + k, 11.0]], INK, 1.2);
-            }
-        },
-        "uncertain",
-    );
-    entry(
-        &|d, x| {
-            d.line(&[[x + 4.0, 13.0], [x + 12.0, 21.0]], GREY, 2.0);
-            d.line(&[[x + 4.0, 21.0], [x + 12.0, 13.0]], GREY, 2.0);
-        },
-        "hidden, inferred",
-    );
-    entry(&|d, x| d.line(&[[x, 17.0], [x + 16.0, 17.0]], VERMILION, 3.0), "5-7 pair");
-    drawing.finish().raster(1.0)
+/// What the legend explains.
+#[derive(Clone, Copy)]
+enum Entry {
+    Sides(u32),
+    Cut,
+    Uncertain,
+    Hidden,
+    Pair,
 }
 
-fn box_of(drawing: &mut Drawing, x: f64, colour: Colour) {
-    drawing.line(&[[x, 10.0], [x + 16.0, 10.0], [x + 16.0, 25.0], [x, 25.0], [x, 10.0]], INK, 3.6);
-    drawing.line(&[[x, 10.0], [x + 16.0, 10.0], [x + 16.0, 25.0], [x, 25.0], [x, 10.0]], colour, 2.4);
+impl Entry {
+    const ALL: [Self; 9] = [
+        Self::Sides(4),
+        Self::Sides(5),
+        Self::Sides(6),
+        Self::Sides(7),
+        Self::Sides(8),
+        Self::Cut,
+        Self::Uncertain,
+        Self::Hidden,
+        Self::Pair,
+    ];
+
+    fn text(self) -> String {
+        match self {
+            Self::Sides(8) => "8 sides".to_owned(),
+            Self::Sides(sides) => sides.to_string(),
+            Self::Cut => status_name(CellStatus::Cut).to_owned(),
+            Self::Uncertain => status_name(CellStatus::Uncertain).to_owned(),
+            Self::Hidden => "hidden, inferred".to_owned(),
+            Self::Pair => "5-7 pair".to_owned(),
+        }
+    }
+
+    /// Draws the swatch, 16 wide, with its upper left corner 10 above the text's line.
+    fn swatch(self, drawing: &mut Drawing, [x, y]: [f64; 2]) {
+        let at = |points: &[[f64; 2]]| points.iter().map(|p| [x + p[0], y + p[1]]).collect::<Vec<_>>();
+        let mut line = |points: &[[f64; 2]], colour, width| drawing.line(&at(points), colour, width);
+        let frame = [[0.0, 10.0], [16.0, 10.0], [16.0, 25.0], [0.0, 25.0], [0.0, 10.0]];
+        match self {
+            Self::Sides(_) | Self::Cut => {
+                let colour = if let Self::Sides(sides) = self { of_sides(sides) } else { GREY };
+                line(&frame, INK, 3.6);
+                line(&frame, colour, 2.4);
+            }
+            Self::Uncertain => {
+                line(&frame, INK, 2.4);
+                for k in [0.0, 5.0, 10.0] {
+                    line(&[[1.0 + k, 24.0], [6.0 + k, 11.0]], INK, 1.2);
+                }
+            }
+            Self::Hidden => {
+                line(&[[4.0, 13.0], [12.0, 21.0]], GREY, 2.0);
+                line(&[[4.0, 21.0], [12.0, 13.0]], GREY, 2.0);
+            }
+            Self::Pair => line(&[[0.0, 17.0], [16.0, 17.0]], INK, 3.0),
+        }
+    }
+}
+
+/// The legend in as many rows as the width asks for.
+fn legend(width: f64) -> Result<RgbImage, FigureError> {
+    let size = if width < 900.0 { 10.0 } else { 13.0 };
+    let [mut x, mut y] = [LEGEND_MARGIN, 0.0];
+    let mut places = Vec::new();
+    for entry in Entry::ALL {
+        let length = 30.0 + size * 0.56 * entry.text().len() as f64;
+        if x + length > width && x > LEGEND_MARGIN {
+            (x, y) = (LEGEND_MARGIN, y + LEGEND_ROW);
+        }
+        places.push((entry, [x, y]));
+        x += length;
+    }
+    let mut drawing = Drawing::new(width, y + LEGEND);
+    for (entry, [x, y]) in places {
+        entry.swatch(&mut drawing, [x, y]);
+        drawing.text([x + 22.0, y + 22.0], size, Anchor::Start, INK, &entry.text());
+    }
+    drawing.finish().raster(1.0)
 }
 
 fn paint(colour: Colour, opacity: f64) -> Paint<'static> {

@@ -22,7 +22,7 @@ use std::{
 };
 
 /// Writes all pieces as VTK poly data (`.vtp`, XML, plain text) with these figures per polygon: `kind` (0 film, 1 lower wall,
-/// 2 upper wall), `cell`, `neighbour` (−1 at a wall), and of the cell its `sides`, `volume`, `pressure` and
+/// 2 upper wall), `cell`, `neighbour` (−1 at a wall), and of the cell its `sides` (0 for one that is cut), `volume`, `pressure` and
 /// `gauss_curvature`.
 ///
 /// # Errors
@@ -132,13 +132,21 @@ fn add_group(file: &mut GltfFile, sides: Option<u32>, group: &[&Piece]) {
             }
         }
     }
-    let name = sides.map_or_else(|| "films".to_owned(), |sides| format!("cells with {sides} sides"));
+    let name = match sides {
+        None => "films".to_owned(),
+        Some(0) => "cut cells".to_owned(),
+        Some(sides) => format!("cells with {sides} sides"),
+    };
     let material = file.add_material(material(sides, &name));
     file.add_mesh(&name, &places, corners.into_iter(), Some(material), None);
 }
 
 fn material(sides: Option<u32>, name: &str) -> Material {
-    let (colour, alpha) = sides.map_or(FILM, |sides| (palette::of_sides(sides), 1.0));
+    let (colour, alpha) = match sides {
+        None => FILM,
+        Some(0) => (palette::GREY, 1.0),
+        Some(sides) => (palette::of_sides(sides), 1.0),
+    };
     // glTF wants linear light; the square is near enough to the sRGB curve.
     let [r, g, b] = colour.0.map(|byte| (f32::from(byte) / 255.0).powi(2));
     Material {

@@ -110,7 +110,7 @@ impl FoamScene {
         let floor = gap.wall(WallSide::Lower);
         let normal = |point: DVec3| floor.field.gradient(point).normalize_or(DVec3::Z);
         let mut cells: Vec<DrawnCell> =
-            figures.sides.iter().map(|&sides| DrawnCell::empty(Some(sides))).collect();
+            figures.sides.iter().map(|&sides| DrawnCell::empty(Some(sides).filter(|&n| n > 0))).collect();
         for piece in pieces {
             let drawn = &mut cells[piece.cell.index()];
             let polygons = piece.polygons.iter().map(|polygon| -> Vec<DVec3> {

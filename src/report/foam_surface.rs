@@ -51,7 +51,7 @@ pub fn pieces(state: &State, gap: &Gap) -> Vec<Piece> {
         let apart = network.neighbour_shift(left) != glam::IVec3::ZERO;
         [Some(left), apart.then_some(right)].into_iter().flatten()
     };
-    let films = network.edges().flat_map(shown).map(|side| {
+    let films = network.films().flat_map(shown).map(|side| {
         let lines: Vec<Vec<DVec3>> = (0..state.rows()).map(|row| closed_line(state, side, row)).collect();
         let (points, polygons) = woven(&lines, false);
         let kind = PieceKind::Film { neighbour: network.neighbour(side) };
@@ -115,7 +115,7 @@ fn real(count: usize) -> f64 {
 /// What is known of the cells of a relaxed foam, in the order of their ids.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellFigures {
-    /// The number of sides.
+    /// The number of sides; 0 for a cell that is cut.
     pub sides: Vec<u32>,
     /// The volume.
     pub volumes: Vec<f64>,

@@ -121,6 +121,44 @@ impl OutputFolder {
         &self.names
     }
 
+    /// The CRC-32 of a file that was written.
+    ///
+    /// # Errors
+    /// [`OutputError`] if it cannot be read back.
+    pub fn checksum(&self, name: &str) -> Result<u32, OutputError> {
+        Ok(crc32fast::hash(&read(&self.staging.path().join(name))?))
+    }
+
+    /// Saves the target's own file of this name unless it has the checksum given or is the same as the one that will replace
+    /// it, so that what a person wrote into it is not lost; the name of the copy.
+    ///
+    /// # Errors
+    /// [`OutputError`] if it cannot be read or copied.
+    pub fn keep_other(&self, name: &str, checksum: Option<u32>) -> Result<Option<String>, OutputError> {
+        let there = self.target.join(name);
+        if !there.is_file() {
+            return Ok(None);
+        }
+        let old = read(&there)?;
+        if checksum == Some(crc32fast::hash(&old)) || old == read(&self.staging.path().join(name))? {
+            return Ok(None);
+        }
+        let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+        let mut number = 1;
+        loop {
+            let copy = format!("{stem}.before-{number}.{extension}");
+            let path = self.target.join(&copy);
+            if !path.exists() {
+                write_whole(&path, |file| io::Write::write_all(file, &old))?;
+                return Ok(Some(copy));
+            }
+            if read(&path)? == old {
+                return Ok(Some(copy));
+            }
+            number += 1;
+        }
+    }
+
     /// Where the files will be.
     #[must_use]
     pub fn target(&self) -> &Path {
@@ -150,6 +188,10 @@ impl OutputFolder {
         }
         Ok(paths)
     }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, OutputError> {
+    fs::read(path).map_err(|e| OutputError::new("read", path, e))
 }
 
 /// Writes one file whole or not at all: under a temporary name beside `path`, then renamed.

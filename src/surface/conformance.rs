@@ -1,6 +1,8 @@
 //! One test that every level set passes.
 
-use super::{Diamond, Gyroid, LevelSet, Plane, SchwarzP, SignedDistance, Sphere, SurfaceSamples, Torus};
+use super::{
+    CutPlane, Diamond, Gyroid, LevelSet, Plane, SchwarzP, SignedDistance, Sphere, SurfaceSamples, Torus,
+};
 use glam::{DMat3, DVec3, IVec3};
 use std::{
     f64::consts::{PI, TAU},
@@ -12,6 +14,7 @@ fn all() -> Vec<Box<dyn LevelSet>> {
         Box::new(Sphere { radius: 1.5 }),
         Box::new(Torus { ring: 3.0, tube: 0.8 }),
         Box::new(Plane { periods: [2.0, 3.0] }),
+        Box::new(CutPlane { axis: 1, at: 0.4, keeps_above: false }),
         Box::new(SchwarzP { period: 1.0 }),
         Box::new(SchwarzP { period: 2.5 }),
         Box::new(Gyroid { period: 1.0 }),

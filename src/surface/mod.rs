@@ -10,6 +10,7 @@
 //! | curvature of a level set from its derivatives | `curvature.rs` |
 //! | projection along the gradient, nearest point by Riemannian Newton steps | `nearest.rs` |
 //! | the surfaces | `sphere.rs`, `torus.rs`, `plane.rs`, `schwarz_p.rs`, `gyroid.rs`, `diamond.rs` |
+//! | planes that cut a gap off | `cut_plane.rs` |
 //! | samples on a grid, from tables where `Φ` is a sum over the axes | `rows.rs` |
 //! | the signed distance of a surface as a level set of its own: true offsets | `offset.rs` |
 //! | points with area weights on a level set: integrals and extremes | `sample.rs` |
@@ -22,6 +23,7 @@
 //! R. Sepulchre, "Optimization algorithms on matrix manifolds" (2008), for Newton steps with a retraction.
 
 mod curvature;
+mod cut_plane;
 mod diamond;
 mod gap;
 mod gap_error;
@@ -37,6 +39,7 @@ mod sphere;
 mod torus;
 
 pub use curvature::Curvature;
+pub use cut_plane::CutPlane;
 pub use diamond::Diamond;
 pub use gap::{Gap, GapKind, GapRange, NamedGap, Wall, WallSide};
 pub use gap_error::GapError;
@@ -107,6 +110,11 @@ pub trait LevelSet: fmt::Debug + Send + Sync {
 
     /// Whether `Φ` is the signed distance from `Φ = 0`, so that its level sets are offsets of each other.
     fn is_distance(&self) -> bool {
+        false
+    }
+
+    /// Whether this is a plane that cuts a gap off, see [`CutPlane`]: what lies on it belongs to no wall of the gap.
+    fn cuts_off(&self) -> bool {
         false
     }
 

@@ -3,7 +3,7 @@
 use crate::{
     comb::{
         kinds::median,
-        triangulation::{Delaunay, circumcentre, voronoi_length},
+        triangulation::{Delaunay, Edge, circumcentre, voronoi_length},
     },
     tessellation::CellPattern,
 };
@@ -142,20 +142,21 @@ impl Arrangement {
     /// The Voronoi cells.
     pub(super) fn cells(&self) -> Vec<DrawnCell> {
         let delaunay = Delaunay::of(&self.centres);
-        let neighbours = delaunay.neighbours(self.centres.len());
+        let neighbours = delaunay.neighbours();
         let mut corners = vec![Vec::new(); self.centres.len()];
-        for triangle in &delaunay.triangles {
+        for triangle in delaunay.triangles() {
             let [a, b, c] = triangle.map(|i| self.centres[i]);
             if let Some(corner) = circumcentre(a, b, c) {
                 triangle.iter().for_each(|i| corners[*i].push(corner));
             }
         }
         let mut rim = vec![false; self.centres.len()];
-        for edge in delaunay.edges.iter().filter(|edge| edge.across().count() < 2) {
+        let edges = delaunay.edges();
+        for edge in edges.iter().filter(|edge| edge.across().count() < 2) {
             rim[edge.ends.0] = true;
             rim[edge.ends.1] = true;
         }
-        let near_misses = self.near_misses(&delaunay);
+        let near_misses = self.near_misses(&edges);
         (0..self.centres.len())
             .map(|i| self.cell(i, &neighbours[i], corners[i].clone(), rim[i], near_misses[i]))
             .collect()
@@ -183,9 +184,9 @@ impl Arrangement {
 
     /// For each cell, the length of the shortest wall across whose ends it lies: were that wall gone, it would have a side
     /// more.
-    fn near_misses(&self, delaunay: &Delaunay) -> Vec<f64> {
+    fn near_misses(&self, edges: &[Edge]) -> Vec<f64> {
         let mut least = vec![f64::INFINITY; self.centres.len()];
-        for edge in &delaunay.edges {
+        for edge in edges {
             if let Some(length) = voronoi_length(&self.centres, edge) {
                 for third in edge.across() {
                     least[third] = least[third].min(length);
@@ -212,7 +213,7 @@ fn hexagonal(half: DVec2, turn: f64) -> Vec<DVec2> {
 }
 
 fn nearest_distances(points: &[DVec2]) -> Vec<f64> {
-    let neighbours = Delaunay::of(points).neighbours(points.len());
+    let neighbours = Delaunay::of(points).neighbours();
     points
         .iter()
         .zip(&neighbours)

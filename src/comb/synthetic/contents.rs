@@ -109,7 +109,8 @@ impl Contents {
             if !within(at) || cell.corners.is_empty() || !self.is_comb(cell.centre) {
                 continue;
             }
-            let framed = cell.corners.iter().all(|c| within(view.in_picture(*c)));
+            // With the outer half of its walls.
+            let framed = cell.corners.iter().all(|c| within(view.in_picture(cell.centre.lerp(*c, 1.1))));
             let open = |i: usize| shown[i] && self.of_cell[i] != Content::Cap;
             let complete = framed && open(index) && cell.neighbours.iter().all(|n| open(*n));
             let sides = u32::try_from(cell.neighbours.len()).ok();

@@ -132,8 +132,8 @@ fn letter(cursor: &mut Cursor, letter: &str) -> Option<Parsed> {
         "V" => return simple(Simple::Average),
         "v" => return simple(Simple::Volumes),
         "e" | "c" => return simple(Simple::Counts),
-        "o" => return simple(Simple::PopEdges),
-        "O" => return simple(Simple::PopNonminimal),
+        "o" => return simple(Simple::PopNonminimal),
+        "O" => return simple(Simple::PopEdges),
         "U" => return simple(Simple::ConjugateGradient(None)),
         "C" => return simple(Simple::Check),
         "X" | "z" | "i" | "E" | "B" | "L" => return simple(Simple::Information),
@@ -217,7 +217,7 @@ fn on_or_off(cursor: &mut Cursor) -> Option<bool> {
     }
 }
 
-fn optional_number(cursor: &mut Cursor) -> Result<Option<Expression>, EvolverError> {
+pub(super) fn optional_number(cursor: &mut Cursor) -> Result<Option<Expression>, EvolverError> {
     let ends = cursor.at_end()
         || cursor.token().first_on_line
         || matches!(cursor.kind(), TokenKind::Symbol(";" | "}" | ")" | ">>" | "|"));
@@ -293,9 +293,7 @@ fn define(cursor: &mut Cursor) -> Parsed {
     let word = cursor.expect_word()?;
     match ElementKind::named(&word) {
         Some(kind) => parse_extra_attribute(cursor, kind).map(Action::DefineAttribute),
-        None => {
-            cursor.unsupported(position, &format!("define {word} in commands"), "define it in the datafile")
-        }
+        None => super::routine::array(cursor, position, &word),
     }
 }
 

@@ -4,10 +4,12 @@
 //! |---|---|
 //! | statements | this page |
 //! | words of the control language: loops, conditions, assignments | `parse.rs` |
+//! | procedures, functions, arrays and local variables | `routine.rs` |
 //! | words that act on the surface | `actions.rs` |
 
 mod actions;
 mod parse;
+mod routine;
 
 use super::{
     datafile::ExtraAttribute,
@@ -21,6 +23,7 @@ use super::{
 use std::sync::Arc;
 
 pub(crate) use parse::statements;
+pub(crate) use routine::{arguments, array, routine};
 
 /// A statement with its place.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,9 +96,9 @@ pub enum Simple {
     Volumes,
     /// `e`, `c`: counts of elements.
     Counts,
-    /// `o`
+    /// `O`: lines where more than three films meet.
     PopEdges,
-    /// `O`
+    /// `o`: these, and points where more meet than can.
     PopNonminimal,
     /// `U`
     ConjugateGradient(Option<bool>),
@@ -119,8 +122,6 @@ pub enum Simple {
     Break,
     /// `continue`
     Continue,
-    /// `return`
-    Return,
     /// A command that shows or sets nothing that matters here.
     Nothing,
     /// `help`
@@ -158,6 +159,17 @@ pub enum Numeric {
     Notch,
 }
 
+/// A procedure or a function with arguments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Routine {
+    /// The names of its arguments.
+    pub arguments: Vec<Arc<str>>,
+    /// What it does.
+    pub body: Statement,
+    /// Whether it returns a number.
+    pub function: bool,
+}
+
 /// What a statement does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
@@ -181,6 +193,14 @@ pub enum Action {
     AssignText(Arc<str>, Expression),
     /// `name := { … }`.
     Define(Arc<str>, Arc<Statement>),
+    /// `procedure name(real a) { … }`, `function real name(real a) { … }`.
+    Routine(Arc<str>, Arc<Routine>),
+    /// `return`, or `return value`.
+    Return(Option<Expression>),
+    /// `local a, b`.
+    Local(Vec<Arc<str>>),
+    /// `define name real[n][m] = {…}`; whether of whole numbers. A variable if there are no sizes.
+    DefineArray(Arc<str>, Vec<Expression>, bool, Option<Expression>),
     /// `vv.x += expression`, `body[1].target := expression`.
     AssignMember(Expression, Assignment, Expression),
     /// `set vertex y expression where …`; the attribute may have an index; a bare attribute switches on.
@@ -235,17 +255,22 @@ pub(crate) fn parse_extra_attribute(
     } else {
         return cursor.expected("«real» or «integer»");
     };
-    let mut length = 1;
+    let mut sizes = Vec::new();
     while cursor.accept("[") {
         let position = cursor.position();
-        length *= usize::try_from(cursor.integer()?).unwrap_or(0);
-        if length == 0 || length > 1000 {
+        sizes.push(usize::try_from(cursor.integer()?).unwrap_or(0));
+        let length = sizes.iter().try_fold(1_usize, |length, &size| length.checked_mul(size));
+        if length.is_none_or(|length| length == 0 || length > 1000) {
             return cursor.invalid(position, "an attribute holds between 1 and 1000 numbers");
         }
         cursor.expect("]")?;
     }
-    if cursor.is_symbol("(") || cursor.word().as_deref() == Some("function") {
+    // `function real f(…)` on its own begins the next definition.
+    let formula = cursor.word().as_deref() == Some("function")
+        && matches!(cursor.ahead(1).kind, crate::evolver::language::TokenKind::Symbol("{"));
+    if cursor.is_symbol("(") || formula {
         return cursor.unsupported(cursor.position(), "an attribute with a formula or a variable size", "");
     }
-    Ok(ExtraAttribute { kind, name, length, integer })
+    let length = sizes.iter().product();
+    Ok(ExtraAttribute { kind, name, sizes, length, integer })
 }

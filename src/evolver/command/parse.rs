@@ -70,7 +70,7 @@ fn starts_count(cursor: &Cursor) -> bool {
     matches!(cursor.kind(), TokenKind::Number(..))
 }
 
-fn block(cursor: &mut Cursor) -> Parsed {
+pub(super) fn block(cursor: &mut Cursor) -> Parsed {
     cursor.expect("{")?;
     let mut out = Vec::new();
     loop {
@@ -92,6 +92,7 @@ fn block(cursor: &mut Cursor) -> Parsed {
                         | Action::For(..)
                         | Action::Foreach(..)
                         | Action::DoWhile(..)
+                        | Action::Routine(..)
                 )
             );
         if !cursor.is_symbol(";")
@@ -118,7 +119,6 @@ fn simple_statement(cursor: &mut Cursor) -> Parsed {
     let Some(word) = cursor.word() else {
         return cursor.expected("a command");
     };
-    let position = cursor.position();
     match word.as_str() {
         "if" => {
             cursor.bump();
@@ -153,20 +153,19 @@ fn simple_statement(cursor: &mut Cursor) -> Parsed {
         }
         "local" => {
             cursor.bump();
-            cursor.expect_word()?;
-            Ok(Action::Simple(Simple::Nothing))
+            super::routine::locals(cursor)
         }
         "function" | "procedure" => {
-            let hint = "define it without arguments: name := { … }";
-            cursor.unsupported(position, "a procedure or function with arguments", hint)
-        }
-        "break" | "continue" | "return" => {
             cursor.bump();
-            Ok(Action::Simple(match word.as_str() {
-                "break" => Simple::Break,
-                "continue" => Simple::Continue,
-                _ => Simple::Return,
-            }))
+            super::routine::routine(cursor, word == "function")
+        }
+        "break" | "continue" => {
+            cursor.bump();
+            Ok(Action::Simple(if word == "break" { Simple::Break } else { Simple::Continue }))
+        }
+        "return" => {
+            cursor.bump();
+            super::actions::optional_number(cursor).map(Action::Return)
         }
         _ => match assignment(cursor)? {
             Some(action) => Ok(action),
@@ -223,10 +222,31 @@ fn starts_command(cursor: &Cursor) -> bool {
     display || (kind.is_some() && known.contains(&word.as_str()))
 }
 
+/// Whether `++` or `--` stands `ahead` tokens from here, with nothing behind it that it could be added to.
+fn steps(cursor: &Cursor, ahead: usize) -> bool {
+    let sign = |at: usize| match cursor.ahead(at).kind {
+        TokenKind::Symbol(sign @ ("+" | "-")) => Some(sign),
+        _ => None,
+    };
+    let close = !cursor.ahead(ahead + 1).space_before && !cursor.ahead(ahead + 1).first_on_line;
+    let behind = cursor.ahead(ahead + 2);
+    let ends =
+        behind.first_on_line || matches!(behind.kind, TokenKind::Symbol(";" | "}" | ")") | TokenKind::End);
+    sign(ahead).is_some() && sign(ahead) == sign(ahead + 1) && close && ends
+}
+
+fn assigned(target: Expression, operator: Assignment, value: Expression) -> Action {
+    match target {
+        Expression::Name(name, _) => Action::Assign(name, operator, value),
+        target => Action::AssignMember(target, operator, value),
+    }
+}
+
 /// An assignment, if one begins here.
 fn assignment(cursor: &mut Cursor) -> Result<Option<Action>, EvolverError> {
     let follows = match cursor.ahead(1).kind {
         TokenKind::Symbol(":=" | "+=" | "-=" | "*=" | "/=" | "[" | ".") => true,
+        TokenKind::Symbol("+" | "-") => steps(cursor, 1),
         TokenKind::Symbol("=") => {
             return cursor.expected("a command; assignments are written with «:=»");
         }
@@ -237,11 +257,20 @@ fn assignment(cursor: &mut Cursor) -> Result<Option<Action>, EvolverError> {
     }
     let mark = cursor.mark();
     let target = cursor.postfix()?;
+    if steps(cursor, 0) {
+        let operator = if cursor.is_symbol("+") { Assignment::Add } else { Assignment::Subtract };
+        cursor.bump();
+        cursor.bump();
+        return Ok(Some(assigned(target, operator, Expression::Number(1.0))));
+    }
     let Some(operator) = assignment_operator(cursor) else {
         cursor.rewind(mark);
         return Ok(None);
     };
     cursor.bump();
+    if cursor.starts_list() {
+        return Ok(Some(assigned(target, operator, cursor.list()?)));
+    }
     let Expression::Name(name, _) = &target else {
         return Ok(Some(Action::AssignMember(target, operator, cursor.expression()?)));
     };

@@ -5,6 +5,7 @@ use super::{
     header::whole,
 };
 use crate::evolver::{
+    command::{Statement, arguments, routine},
     error::EvolverError,
     language::{
         TokenKind,
@@ -222,41 +223,34 @@ impl Reader {
         self.components('q', Space::Coordinates)
     }
 
-    /// `function real name (real a, real b) { return …; }`.
-    pub(super) fn function(&mut self) -> Result<(), EvolverError> {
-        let position = self.cursor.position();
+    /// `function real name (real a, real b) { return …; }`, which formulas may use; one of several statements is for commands
+    /// only.
+    pub(super) fn function(&mut self, position: Position) -> Result<(), EvolverError> {
+        let start = self.cursor.mark();
+        let Some((name, function)) = self.formula_function()? else {
+            self.cursor.rewind(start);
+            let action = routine(&mut self.cursor, true)?;
+            self.data.prelude.push(Statement { position, action });
+            self.cursor.accept(";");
+            return Ok(());
+        };
+        self.data.functions.insert(name, function);
+        Ok(())
+    }
+
+    /// A function that is one expression; `None` for any other.
+    fn formula_function(&mut self) -> Result<Option<(Arc<str>, Function)>, EvolverError> {
         if !self.cursor.accept_any(&["real", "integer"]) {
             return self.cursor.expected("«real», the type of what the function returns");
         }
         let name: Arc<str> = self.cursor.expect_word()?.into();
-        self.cursor.expect("(")?;
-        let mut arguments = Vec::new();
-        while !self.cursor.accept(")") {
-            if !self.cursor.accept_any(&["real", "integer"]) {
-                return self.cursor.expected("the type of an argument, «real», or «)»");
-            }
-            arguments.push(self.cursor.expect_word()?.into());
-            if !self.cursor.is_symbol(")") {
-                self.cursor.expect(",")?;
-            }
-        }
-        if self.cursor.accept(";") {
-            return self.cursor.unsupported(
-                position,
-                "a function's prototype",
-                "define functions before their use",
-            );
-        }
-        self.cursor.expect("{")?;
-        if !self.cursor.accept_word("return") {
-            let hint = "write the function as one «return» expression; a ? b : c chooses";
-            return self.cursor.unsupported(position, "a function of several statements", hint);
+        let arguments = arguments(&mut self.cursor)?;
+        if !self.cursor.accept("{") || !self.cursor.accept_word("return") {
+            return Ok(None);
         }
         let body = self.cursor.expression()?;
         self.cursor.accept(";");
-        self.cursor.expect("}")?;
-        self.data.functions.insert(name, Function { arguments, body });
-        Ok(())
+        Ok(self.cursor.accept("}").then_some((name, Function { arguments, body })))
     }
 
     /// A list of labels: `1 2`, `1,2`.

@@ -2,6 +2,7 @@
 
 use super::{Model, Reader, Representation};
 use crate::evolver::{
+    command::Statement,
     error::EvolverError,
     language::{
         TokenKind,
@@ -62,7 +63,7 @@ const IGNORED_WORDS: [&str; 14] = [
 ];
 
 /// What is refused, with the nearest way to do it.
-const REFUSED: [(&str, &str); 38] = [
+const REFUSED: [(&str, &str); 37] = [
     ("optimizing_parameter", "scan the parameter with a loop of commands"),
     ("optimising_parameter", "scan the parameter with a loop of commands"),
     ("metric", "only Euclidean space is supported"),
@@ -84,7 +85,6 @@ const REFUSED: [(&str, &str); 38] = [
     ("normal_motion", ""),
     ("approximate_curvature", ""),
     ("approx_curvature", ""),
-    ("procedure", "define a procedure in the read section: name := { … }"),
     ("squared_curvature", ""),
     ("square_curvature", ""),
     ("mean_curvature_integral", ""),
@@ -148,7 +148,12 @@ impl Reader {
             "boundary" => self.boundary()?,
             "quantity" => self.quantity(position)?,
             "method_instance" => self.method_instance()?,
-            "function" => self.function()?,
+            "function" => self.function(position)?,
+            "procedure" => {
+                let action = crate::evolver::command::routine(&mut self.cursor, false)?;
+                self.data.prelude.push(Statement { position, action });
+                self.cursor.accept(";");
+            }
             "define" => self.extra_attribute()?,
             _ => return self.setting(word, position),
         }
@@ -314,7 +319,9 @@ impl Reader {
         let position = self.cursor.position();
         let word = self.cursor.expect_word()?;
         let Some(kind) = ElementKind::named(&word) else {
-            return self.cursor.unsupported(position, &format!("DEFINE {}", word.to_uppercase()), "");
+            let action = crate::evolver::command::array(&mut self.cursor, position, &word)?;
+            self.data.prelude.push(Statement { position, action });
+            return Ok(());
         };
         let attribute = crate::evolver::command::parse_extra_attribute(&mut self.cursor, kind)?;
         self.data.extra_attributes.push(attribute);

@@ -11,6 +11,7 @@ mod elements;
 mod header;
 
 use super::{
+    command::Statement,
     error::EvolverError,
     language::{
         Cursor,
@@ -166,6 +167,8 @@ pub struct ExtraAttribute {
     pub kind: ElementKind,
     /// Its name, lower case.
     pub name: Arc<str>,
+    /// How many numbers it holds by each of its indices; none if it is one number.
+    pub sizes: Vec<usize>,
     /// How many numbers it holds.
     pub length: usize,
     /// Whether they are whole.
@@ -288,6 +291,8 @@ pub struct Datafile {
     pub boundaries: Vec<Boundary>,
     /// Quantities in order.
     pub quantities: Vec<Quantity>,
+    /// What the definitions do before the `read` section: procedures, functions of several statements, arrays.
+    pub prelude: Vec<Statement>,
     /// Added attributes.
     pub extra_attributes: Vec<ExtraAttribute>,
     /// Whether gravity acts.
@@ -373,6 +378,7 @@ impl Datafile {
             constraints: Vec::new(),
             boundaries: Vec::new(),
             quantities: Vec::new(),
+            prelude: Vec::new(),
             extra_attributes: Vec::new(),
             gravity: true,
             symmetric_content: false,

@@ -149,6 +149,8 @@ pub enum Expression {
     Member(Box<Expression>, Arc<str>, Position),
     /// `on_constraint n` and its kin.
     Test(ElementTest, Box<Expression>, Position),
+    /// `{1, 2}`, `{{1, 2}, {3, 4}}`: the values of an array.
+    List(Vec<Expression>, Position),
     /// `sum(query, value)` and its kin.
     Aggregate(Aggregate, Box<(Query, Expression)>, Position),
 }

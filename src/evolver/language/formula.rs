@@ -214,6 +214,9 @@ fn compile(
         Expression::Member(_, name, position) => {
             return fail(*position, format!("the attribute «{name}» inside a formula"), true);
         }
+        Expression::List(_, position) => {
+            return fail(*position, "an array inside a formula", true);
+        }
         Expression::Test(_, _, position) | Expression::Aggregate(_, _, position) => {
             return fail(*position, "a query inside a formula", true);
         }

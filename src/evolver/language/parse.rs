@@ -204,6 +204,39 @@ impl Cursor {
         }
     }
 
+    /// `{1, 2}` or `{{1, 2}, {3, 4}}`.
+    pub(crate) fn list(&mut self) -> Parsed {
+        let position = self.position();
+        self.enter()?;
+        self.expect("{")?;
+        let mut values = Vec::new();
+        while !self.is_symbol("}") {
+            values.push(if self.is_symbol("{") { self.list()? } else { self.expression()? });
+            if !self.accept(",") {
+                break;
+            }
+        }
+        self.expect("}")?;
+        self.leave();
+        Ok(Expression::List(values, position))
+    }
+
+    /// Whether values of an array stand here, and not statements: a number or a name before a comma.
+    pub(crate) fn starts_list(&self) -> bool {
+        if !self.is_symbol("{") {
+            return false;
+        }
+        let mut depth = 1;
+        while matches!(self.ahead(depth).kind, TokenKind::Symbol("{")) {
+            depth += 1;
+        }
+        match self.ahead(depth).kind {
+            TokenKind::Number(..) | TokenKind::Symbol("-" | "+" | "(") => true,
+            TokenKind::Word(_) => matches!(self.ahead(depth + 1).kind, TokenKind::Symbol(",")),
+            _ => false,
+        }
+    }
+
     fn aggregate(&mut self, aggregate: Aggregate) -> Parsed {
         let position = self.position();
         self.enter()?;

@@ -29,6 +29,10 @@ impl Session {
         position: Position,
         scope: &mut Scope,
     ) -> Result<(), EvolverError> {
+        if let Some(local) = scope.local(name) {
+            *local = combined(*local, operator, value);
+            return Ok(());
+        }
         match name {
             "scale" => {
                 self.descent.scale = combined(self.descent.scale, operator, value);
@@ -84,13 +88,24 @@ impl Session {
                 self.set_attribute(element, name, None, operator, value, *at, scope)
             }
             Expression::Index(parts, at) => {
-                let index = self.evaluate(&parts[1], scope)?;
-                match &parts[0] {
+                let (base, indices) = super::arrays::indexed(&parts[0], &parts[1]);
+                let mut places = Vec::with_capacity(indices.len());
+                for index in indices {
+                    places.push(self.evaluate(index, scope)?);
+                }
+                match base {
                     Expression::Member(owner, name, _) => {
                         let element = self.element(owner, scope)?;
-                        self.set_attribute(element, name, Some(index), operator, value, *at, scope)
+                        let index = Some(self.flat_index(element.kind, name, &places));
+                        self.set_attribute(element, name, index, operator, value, *at, scope)
                     }
-                    _ => scope.fail(*at, "arrays are not supported; use added attributes of elements"),
+                    Expression::Name(name, _) if self.arrays.contains_key(name) => {
+                        self.assign_entry(name, &places, operator, value, *at, scope)
+                    }
+                    Expression::Name(name, _) => {
+                        scope.fail(*at, format!("«{name}» is no array: define {name} real[…] makes one"))
+                    }
+                    _ => scope.fail(*at, "only arrays and attributes have an index"),
                 }
             }
             _ => scope.fail(position, "only variables and attributes can be assigned to"),

@@ -104,6 +104,10 @@ impl Session {
                     elements.iter().map(|element| EdgeId::from_index(element.index)).collect();
                 self.delete_edges(&edges)
             }
+            (ElementCommand::Pop, Some(ElementKind::Vertex | ElementKind::Edge)) => {
+                self.pop_elements(&elements, scope)?
+            }
+            (ElementCommand::T1, Some(ElementKind::Edge)) => self.t1_edges(&elements, scope)?,
             (command, Some(kind)) => {
                 let message = format!("not supported: {command:?} of elements of the kind {}", kind.name());
                 return scope.fail(Position::default(), message);
@@ -111,7 +115,13 @@ impl Session {
         };
         self.changed();
         if !self.quiet {
-            host.print(&format!("{command:?}: {count} elements\n"));
+            let done = match (command, kind) {
+                (ElementCommand::T1, _) => "T1 swaps".to_owned(),
+                (ElementCommand::Pop, Some(ElementKind::Edge)) => "Edges popped".to_owned(),
+                (ElementCommand::Pop, _) => "Vertices popped".to_owned(),
+                (command, _) => format!("{command:?}, elements"),
+            };
+            host.print(&format!("{done}: {count}\n"));
         }
         Ok(())
     }
@@ -129,23 +139,16 @@ impl Session {
         }
     }
 
-    /// Collapses edges one after the other; numbers of those behind a deleted one move.
+    /// Collapses edges one after the other, as far as they still exist. How many.
     pub(super) fn delete_edges(&mut self, edges: &[EdgeId]) -> usize {
-        let mut keys: Vec<_> = edges.iter().map(|&edge| self.surface.edges[edge].ends).collect();
+        let mut left: Vec<EdgeId> = edges.to_vec();
         let mut count = 0;
-        while let Some(ends) = keys.pop() {
-            let found = self.surface.edges.enumerated().find(|(_, edge)| edge.ends == ends).map(|(id, _)| id);
-            let before = self.surface.vertices.len();
-            if let Some(edge) = found
-                && self.surface.has_edge(edge)
-                && self.surface.collapse(edge)
-            {
-                count += 1;
-                if self.surface.vertices.len() != before {
-                    // Numbers have moved: what remains is found anew by the caller's next command.
-                    break;
-                }
-            }
+        left.reverse();
+        while let Some(edge) = left.pop() {
+            let Some(renumbered) = self.surface.collapse(edge) else { continue };
+            count += 1;
+            left =
+                left.into_iter().filter_map(|old| renumbered.get(old.index()).copied().flatten()).collect();
         }
         count
     }

@@ -22,6 +22,8 @@ pub(super) struct Element {
 #[derive(Clone, Debug)]
 pub(super) struct Scope {
     entries: Vec<(Option<Arc<str>>, Element)>,
+    /// Local variables, the innermost last.
+    locals: Vec<(Arc<str>, f64)>,
     /// The text that the expressions come from.
     source: Option<Arc<Source>>,
 }
@@ -29,13 +31,31 @@ pub(super) struct Scope {
 impl Scope {
     /// No elements; expressions come from `source`.
     pub(super) fn new(source: Option<Arc<Source>>) -> Self {
-        Self { entries: Vec::new(), source }
+        Self { entries: Vec::new(), locals: Vec::new(), source }
     }
 
-    pub(super) fn with(&self, name: Option<Arc<str>>, element: Element) -> Self {
-        let mut scope = self.clone();
-        scope.entries.push((name, element));
-        scope
+    /// The text that the expressions come from.
+    pub(super) fn source(&self) -> Option<&Arc<Source>> {
+        self.source.as_ref()
+    }
+
+    /// How many local variables there are.
+    pub(super) fn locals(&self) -> usize {
+        self.locals.len()
+    }
+
+    /// Forgets all local variables but the first `count`.
+    pub(super) fn forget(&mut self, count: usize) {
+        self.locals.truncate(count);
+    }
+
+    pub(super) fn declare(&mut self, name: Arc<str>, value: f64) {
+        self.locals.push((name, value));
+    }
+
+    /// The innermost local variable of a name.
+    pub(super) fn local(&mut self, name: &str) -> Option<&mut f64> {
+        self.locals.iter_mut().rev().find(|(own, _)| **own == *name).map(|(_, value)| value)
     }
 
     fn named(&self, name: &str) -> Option<Element> {
@@ -44,11 +64,6 @@ impl Scope {
 
     pub(super) fn innermost(&self) -> Option<Element> {
         self.entries.last().map(|(_, element)| *element)
-    }
-
-    /// The same text without elements.
-    pub(super) fn bare(&self) -> Self {
-        Self::new(self.source.clone())
     }
 
     pub(super) fn push(&mut self, name: Option<Arc<str>>, element: Element) {
@@ -92,6 +107,9 @@ impl Session {
     pub(super) fn evaluate(&mut self, expression: &Expression, scope: &mut Scope) -> Value {
         match expression {
             Expression::Number(value) => Ok(*value),
+            Expression::List(_, position) => {
+                scope.fail(*position, "an array stands where a number is needed")
+            }
             Expression::Text(_) => scope.fail(Position::default(), "a text stands where a number is needed"),
             Expression::Name(name, position) => self.name(name, *position, scope),
             Expression::Unary(operator, inner) => {
@@ -102,6 +120,9 @@ impl Session {
                 })
             }
             Expression::Binary(operator, operands) => {
+                if let Some(product) = self.dot_product(*operator, operands) {
+                    return Ok(product);
+                }
                 let left = self.evaluate(&operands[0], scope)?;
                 // The second operand is not looked at where the first decides: it may make no sense then.
                 match operator {
@@ -143,6 +164,9 @@ impl Session {
     }
 
     fn name(&mut self, name: &str, position: Position, scope: &mut Scope) -> Value {
+        if let Some(value) = scope.local(name) {
+            return Ok(*value);
+        }
         if let Some(element) = scope.innermost()
             && let Some(value) = self.attribute(element, name, None)?
         {
@@ -158,13 +182,24 @@ impl Session {
         if let Some(value) = self.internal(name)? {
             return Ok(value);
         }
+        if self.arrays.contains_key(name) {
+            return scope.fail(position, format!("«{name}» is an array: one of its numbers is {name}[1]"));
+        }
         scope.fail(position, format!("«{name}» is not defined"))
     }
 
     fn call(&mut self, name: &str, operands: &[Expression], position: Position, scope: &mut Scope) -> Value {
+        if let ("sizeof", [Expression::Name(array, _)]) = (name, operands)
+            && let Some(array) = self.arrays.get(array)
+        {
+            return Ok(array.len() as f64);
+        }
         let mut values = Vec::with_capacity(operands.len());
         for operand in operands {
             values.push(self.evaluate(operand, scope)?);
+        }
+        if let Some(value) = self.call_function(name, &values, position, scope)? {
+            return Ok(value);
         }
         if let ([value], Some(function)) = (&values[..], UnaryFunction::named(name)) {
             return Ok(function.apply(*value));
@@ -193,17 +228,29 @@ impl Session {
         position: Position,
         scope: &mut Scope,
     ) -> Value {
-        let at = self.evaluate(index, scope)?;
+        let (base, indices) = super::arrays::indexed(base, index);
+        let mut at = Vec::with_capacity(indices.len());
+        for index in indices {
+            at.push(self.evaluate(index, scope)?);
+        }
         match base {
             Expression::Name(name, _) => {
-                if let Some(element) = scope.innermost()
-                    && let Some(value) = self.attribute(element, name, Some(at))?
-                {
-                    return Ok(value);
+                if let Some(element) = scope.innermost() {
+                    let flat = self.flat_index(element.kind, name, &at);
+                    if let Some(value) = self.attribute(element, name, Some(flat))? {
+                        return Ok(value);
+                    }
                 }
-                scope.fail(position, format!("«{name}» has no element {at}"))
+                if self.arrays.contains_key(name) {
+                    return self.array_entry(name, &at, position, scope).map(|entry| *entry);
+                }
+                scope.fail(position, format!("«{name}» has no element {at:?}"))
             }
-            Expression::Member(owner, name, _) => self.member(owner, name, Some(at), position, scope),
+            Expression::Member(owner, name, _) => {
+                let element = self.element(owner, scope)?;
+                let flat = self.flat_index(element.kind, name, &at);
+                self.member(owner, name, Some(flat), position, scope)
+            }
             _ => scope.fail(position, "only names and attributes have an index"),
         }
     }

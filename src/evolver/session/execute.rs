@@ -6,7 +6,7 @@ use super::{
     format::{Argument, printf, significant},
 };
 use crate::evolver::{
-    command::{Action, Simple, Statement},
+    command::{Action, Routine, Simple, Statement},
     error::EvolverError,
     language::{
         expression::{Expression, Query},
@@ -81,13 +81,10 @@ impl Session {
         }
         match &statement.action {
             Action::Block(statements) => {
-                for statement in statements {
-                    let flow = self.execute(statement, scope, host)?;
-                    if flow != Flow::Next {
-                        return Ok(flow);
-                    }
-                }
-                Ok(Flow::Next)
+                let outer = scope.locals();
+                let flow = self.block(statements, scope, host);
+                scope.forget(outer);
+                flow
             }
             Action::Repeat(body, count) => {
                 let count = self.evaluate(count, scope)?;
@@ -119,13 +116,30 @@ impl Session {
             Action::Call(name) => self.call_procedure(name, statement.position, scope, host),
             Action::Simple(Simple::Break) => Ok(Flow::Break),
             Action::Simple(Simple::Continue) => Ok(Flow::Continue),
-            Action::Simple(Simple::Return) => Ok(Flow::Return),
+            Action::Return(value) => {
+                self.returned = value.as_ref().map(|value| self.evaluate(value, scope)).transpose()?;
+                Ok(Flow::Return)
+            }
+            Action::Show(Expression::Call(name, operands, position)) if self.is_procedure(name) => {
+                self.call_with(name, operands, *position, scope, host)
+            }
             Action::Simple(Simple::Quit) => Ok(Flow::Quit),
             other => {
-                self.act(other, statement.position, scope, host)?;
-                Ok(Flow::Next)
+                let done = self.act(other, statement.position, scope, host);
+                self.tell(host)?;
+                done.map(|()| Flow::Next)
             }
         }
+    }
+
+    fn block(&mut self, statements: &[Statement], scope: &mut Scope, host: &mut dyn Host) -> Ran {
+        for statement in statements {
+            let flow = self.execute(statement, scope, host)?;
+            if flow != Flow::Next {
+                return Ok(flow);
+            }
+        }
+        Ok(Flow::Next)
     }
 
     fn repeat(&mut self, action: &Action, scope: &mut Scope, host: &mut dyn Host) -> Ran {
@@ -159,8 +173,10 @@ impl Session {
             if element.index >= self.count(element.kind) {
                 break;
             }
-            let mut inner = scope.with(query.name.clone(), element);
-            match self.execute(body, &mut inner, host)? {
+            scope.push(query.name.clone(), element);
+            let flow = self.execute(body, scope, host);
+            scope.pop();
+            match flow? {
                 Flow::Next | Flow::Continue => {}
                 Flow::Break => break,
                 flow => return Ok(flow),
@@ -192,21 +208,8 @@ impl Session {
         scope: &mut Scope,
         host: &mut dyn Host,
     ) -> Ran {
-        if let Some(procedure) = self.procedures.get(name).cloned() {
-            self.spend()?;
-            self.depth += 1;
-            if self.depth > PROCEDURE_DEPTH {
-                self.depth = 0;
-                return scope.fail(position, format!("«{name}» calls itself without end"));
-            }
-            // A procedure sees no elements of its caller.
-            let mut own = scope.bare();
-            let flow = self.execute(&procedure, &mut own, host);
-            self.depth = self.depth.saturating_sub(1);
-            return Ok(match flow? {
-                Flow::Quit => Flow::Quit,
-                _ => Flow::Next,
-            });
+        if self.is_procedure(name) {
+            return self.call_with(name, &[], position, scope, host);
         }
         let expression = Expression::Name(name.clone(), position);
         if let Some(text) = self.texts.get(name) {
@@ -234,8 +237,22 @@ impl Session {
     ) -> Result<(), EvolverError> {
         match action {
             Action::Assign(name, operator, value) => {
+                if self.assign_array(name, *operator, value, position, scope)? {
+                    return Ok(());
+                }
                 let value = self.evaluate(value, scope)?;
                 self.assign(name, *operator, value, position, scope)
+            }
+            Action::Local(names) => {
+                names.iter().for_each(|name| scope.declare(name.clone(), 0.0));
+                Ok(())
+            }
+            Action::Routine(name, routine) => {
+                self.learn(name, routine.clone(), scope);
+                Ok(())
+            }
+            Action::DefineArray(name, sizes, integer, values) => {
+                self.define_array(name, (sizes, *integer), values.as_ref(), position, scope)
             }
             Action::AssignText(name, value) => {
                 let text: Arc<str> = self.text(value, scope)?.into();
@@ -243,8 +260,13 @@ impl Session {
                 Ok(())
             }
             Action::Define(name, body) => {
-                self.procedures.insert(name.clone(), body.clone());
+                let routine =
+                    Routine { arguments: Vec::new(), body: Statement::clone(body), function: false };
+                self.learn(name, Arc::new(routine), scope);
                 Ok(())
+            }
+            Action::AssignMember(target, operator, value @ Expression::List(..)) => {
+                self.assign_whole_attribute(target, *operator, value, position, scope)
             }
             Action::AssignMember(target, operator, value) => {
                 let value = self.evaluate(value, scope)?;
@@ -261,12 +283,18 @@ impl Session {
                     host.print(&format!("{text}\n"));
                     return Ok(());
                 }
+                if let Some(array) = self.array_value(value, scope)? {
+                    host.print(&format!("{array}\n"));
+                    return Ok(());
+                }
                 let value = self.evaluate(value, scope)?;
+                self.tell(host)?;
                 host.print(&format!("{}\n", significant(value, 15)));
                 Ok(())
             }
             Action::Printf(format, arguments) => {
                 let text = self.formatted(format, arguments, position, scope)?;
+                self.tell(host)?;
                 host.print(&text);
                 Ok(())
             }
@@ -348,6 +376,3 @@ impl Session {
         }
     }
 }
-
-/// How deep procedures may call procedures.
-const PROCEDURE_DEPTH: usize = 60;

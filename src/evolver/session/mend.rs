@@ -3,7 +3,6 @@
 use super::{Host, Session, motion::Done};
 use crate::evolver::{
     datafile::Representation,
-    error::EvolverError,
     surface::{EdgeId, FacetId},
 };
 
@@ -19,7 +18,7 @@ impl Session {
             .nth(tried)
         {
             self.spend()?;
-            if self.surface.collapse(edge) {
+            if self.surface.collapse(edge).is_some() {
                 count += 1;
             } else {
                 tried += 1;
@@ -46,7 +45,7 @@ impl Session {
                 .iter()
                 .map(|d| d.edge)
                 .min_by(|a, b| self.surface.edge_length(*a).total_cmp(&self.surface.edge_length(*b)));
-            if shortest.is_some_and(|edge| self.surface.collapse(edge)) {
+            if shortest.is_some_and(|edge| self.surface.collapse(edge).is_some()) {
                 count += 1;
             } else {
                 tried += 1;
@@ -79,25 +78,6 @@ impl Session {
         self.refine_edges(&long);
         self.changed();
         self.say(host, &format!("Edges divided: {}\n", long.len()));
-        Ok(())
-    }
-
-    /// `o`, `O`: nothing to do where at most three films, or strings, meet; else it is not supported.
-    pub(super) fn pop(&mut self, host: &mut dyn Host) -> Done {
-        let around = self.surface.neighbours();
-        let over = if self.has_films() {
-            self.surface.edges.ids().filter(|&edge| around.facets[edge].len() > 3).count()
-        } else {
-            self.surface.vertices.ids().filter(|&vertex| around.edges[vertex].len() > 3).count()
-        };
-        if over > 0 {
-            let message = format!(
-                "not supported: popping ({over} places where more than three films or strings meet). \
-                 T1s of whole foams: combwright foam"
-            );
-            return Err(EvolverError::Surface(message));
-        }
-        self.say(host, "Popped: 0\n");
         Ok(())
     }
 }

@@ -4,15 +4,18 @@
 //! |---|---|
 //! | the state; energies kept up to date | this page |
 //! | statements: loops, assignments, procedures | `execute.rs` |
-//! | assignments | `assign.rs` |
+//! | procedures, functions, local variables | `routines.rs` |
+//! | assignments; arrays | `assign.rs`, `arrays.rs` |
 //! | values of expressions | `evaluate.rs`, `attributes.rs` |
 //! | moving the surface: `g`, `r`, `V` and their kin | `motion.rs` |
 //! | Newton steps and eigenvalues; sliding along walls | `seek.rs`, `slide.rs` |
 //! | short edges, small and narrow facets | `mend.rs` |
+//! | T1s and pops | `pop.rs` |
 //! | changing and listing elements | `elements.rs` |
 //! | text with formats | `format.rs` |
 //! | datafiles | `dump.rs` |
 
+mod arrays;
 mod assign;
 mod attributes;
 mod dump;
@@ -22,6 +25,8 @@ mod execute;
 mod format;
 mod mend;
 mod motion;
+mod pop;
+mod routines;
 mod seek;
 mod slide;
 
@@ -29,7 +34,6 @@ pub use execute::Flow;
 pub use format::significant;
 
 use super::{
-    command::Statement,
     datafile::{Datafile, Model, Purpose, Representation},
     error::EvolverError,
     language::formula::{GRAVITY, Variables},
@@ -68,7 +72,12 @@ pub struct Session {
     pub(super) surface: Surface,
     pub(super) variables: Variables,
     texts: BTreeMap<Arc<str>, Arc<str>>,
-    procedures: BTreeMap<Arc<str>, Arc<Statement>>,
+    arrays: BTreeMap<Arc<str>, arrays::Array>,
+    routines: BTreeMap<Arc<str>, routines::Known>,
+    /// What the function that runs has returned.
+    returned: Option<f64>,
+    /// What functions have printed and written while an expression was evaluated.
+    told: routines::Told,
     quantities: Vec<QuantityState>,
     multipliers: IndexVec<FunctionalId, f64>,
     gravity: bool,
@@ -151,7 +160,10 @@ impl Session {
             gap: data.gap_constant,
             surface,
             texts: BTreeMap::new(),
-            procedures: BTreeMap::new(),
+            arrays: BTreeMap::new(),
+            routines: BTreeMap::new(),
+            returned: None,
+            told: routines::Told::default(),
             quantities,
             multipliers,
             descent,

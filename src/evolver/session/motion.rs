@@ -14,6 +14,9 @@ use crate::evolver::{
 };
 use std::fmt::Write as _;
 
+/// Elements that a refinement may make: an element takes about a kilobyte, its Hessian as much again.
+const MOST_ELEMENTS: usize = 4_000_000;
+
 /// Steps of one `g` at most.
 const MOST_STEPS: f64 = 1e7;
 
@@ -48,6 +51,12 @@ impl Session {
     ) -> Done {
         match simple {
             Simple::Refine => {
+                let grown = 4 * self.surface.facets.len().max(self.surface.edges.len() / 2);
+                if grown > MOST_ELEMENTS {
+                    let message =
+                        format!("refining would make {grown} elements; at most {MOST_ELEMENTS} are kept");
+                    return scope.fail(position, message);
+                }
                 self.surface.refine();
                 self.changed();
                 self.current()?;
@@ -67,7 +76,8 @@ impl Session {
             }
             Simple::Volumes => self.volumes(host)?,
             Simple::Counts => self.counts(host),
-            Simple::PopEdges | Simple::PopNonminimal => return self.pop(host),
+            Simple::PopNonminimal => return self.pop(true, scope, host),
+            Simple::PopEdges => return self.pop(false, scope, host),
             Simple::ConjugateGradient(on) => {
                 self.descent.conjugate = on.unwrap_or(!self.descent.conjugate);
                 self.descent.restart();
@@ -199,8 +209,11 @@ impl Session {
         let mut left = steps;
         let mut slots = None;
         while left > 0.5 {
-            if host.interrupted() {
-                return Err(EvolverError::Interrupted);
+            let allowed = if host.interrupted() { Err(EvolverError::Interrupted) } else { self.spend() };
+            if let Err(stop) = allowed {
+                // What the steps so far have come to is kept.
+                self.finish_motion()?;
+                return Err(stop);
             }
             self.current()?;
             let Some(current) = &mut self.problem else { return Ok(()) };

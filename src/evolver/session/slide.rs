@@ -16,7 +16,7 @@ use crate::{
 use glam::DVec3;
 
 /// Stretches of way before giving up.
-const STRETCHES: f64 = 100.0;
+const STRETCHES: f64 = 300.0;
 /// The first stretch and the least, as parts of the size of the surface.
 const FIRST: f64 = 0.25;
 const LEAST: f64 = 1e-3;
@@ -25,22 +25,53 @@ const STEPS_TO_REST: usize = 12;
 /// The relative change of the energy at which the films rest.
 const REST: f64 = 1e-13;
 
+/// How often the mesh is evened out on the way: it grows uneven as it is carried along.
+const RENEWALS: usize = 12;
+/// The way behind a renewal, as a part of the size of the surface, below which the surface has come to where it stays.
+const WORTH: f64 = 0.02;
+
 impl Session {
-    /// Slides in at most `most` stretches.
+    /// Slides in at most `most` stretches, and evens out the mesh wherever it goes no further, as long as it goes on then.
     pub(super) fn slide(&mut self, most: Option<f64>, host: &mut dyn Host) -> Done {
-        let (mut way, mut left) = (0.0, most.unwrap_or(STRETCHES));
+        let mut left = most.unwrap_or(STRETCHES);
+        let mut way = self.slide_on(&mut left, host)?;
+        for _ in 0..RENEWALS {
+            if left < 0.5 || way <= 0.0 {
+                break;
+            }
+            let (surface, multipliers) = (self.surface.clone(), self.multipliers.clone());
+            let further = self.average(None).and_then(|()| self.slide_on(&mut left, host));
+            match further {
+                Ok(further) if further > WORTH * self.size() => way += further,
+                Err(EvolverError::Interrupted) => return Err(EvolverError::Interrupted),
+                _ => {
+                    // The mesh before it was evened out in vain.
+                    (self.surface, self.multipliers) = (surface, multipliers);
+                    self.changed();
+                    self.current()?;
+                    break;
+                }
+            }
+        }
+        self.say(host, &format!("Slid by {}.\n", significant(way, 6)));
+        self.report_energy(host)
+    }
+
+    /// Slides as far as the energy falls with this mesh. The way.
+    fn slide_on(&mut self, left: &mut f64, host: &mut dyn Host) -> Result<f64, EvolverError> {
+        let mut way = 0.0;
         let (mut stretch, least) = (FIRST * self.size(), LEAST * self.size());
         let mut best = self.energy_at_rest()?;
-        while left > 0.5 && stretch > least {
+        while *left > 0.5 && stretch > least {
             if host.interrupted() {
                 return Err(EvolverError::Interrupted);
             }
-            left -= 1.0;
+            *left -= 1.0;
             let Some(direction) = self.way_down(least)? else {
                 self.say(host, "Nothing lets the surface slide.\n");
                 break;
             };
-            let Some(Current { problem, state, values, .. }) = &self.problem else { return Ok(()) };
+            let Some(Current { problem, state, values, .. }) = &self.problem else { break };
             let (old, before, multipliers) = (state.clone(), values.clone(), self.multipliers.clone());
             let (moved, after) = problem.stepped(&old, &direction, stretch)?;
             let sound = after.energy.is_finite() && problem.turned_over(&old.places, &moved.places) == 0;
@@ -57,8 +88,7 @@ impl Session {
                 stretch *= 0.5;
             }
         }
-        self.say(host, &format!("Slid by {}.\n", significant(way, 6)));
-        self.report_energy(host)
+        Ok(way)
     }
 
     /// The unit velocity along the walls by which the energy falls most.

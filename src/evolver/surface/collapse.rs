@@ -6,16 +6,16 @@ use glam::IVec3;
 use std::collections::BTreeMap;
 
 impl Surface {
-    /// Collapses an edge: its head becomes its tail, and facets that lose an edge vanish. False where the ends may not be
-    /// one, or an edge would become a loop.
-    pub(crate) fn collapse(&mut self, id: EdgeId) -> bool {
+    /// Collapses an edge: its head becomes its tail, and facets that lose an edge vanish. The new id of each old edge, `None`
+    /// for those that vanished; no list where the ends may not be one, or an edge would become a loop.
+    pub(crate) fn collapse(&mut self, id: EdgeId) -> Option<Vec<Option<EdgeId>>> {
         let neighbours = self.neighbours();
         let edge = self.edges[id].clone();
         let [tail, head] = edge.ends;
         if tail == head || edge.common.fixed {
-            return false;
+            return None;
         }
-        let Some(kept) = self.survivor(tail, head) else { return false };
+        let kept = self.survivor(tail, head)?;
         let lost = if kept == tail { head } else { tail };
         // What hung on the lost vertex now hangs on the kept one, over the collapsed edge's wrap.
         let shift = if kept == tail { edge.wrap } else { -edge.wrap };
@@ -24,6 +24,7 @@ impl Surface {
         } else {
             Vec::new()
         };
+        let replaced = self.merged_sides(&vanishing, id)?;
         for &other in &neighbours.edges[lost] {
             if other != id {
                 self.reattach(other, lost, kept, shift);
@@ -33,8 +34,8 @@ impl Surface {
             for &(facet, _) in &neighbours.facets[id] {
                 self.facets[facet].edges.retain(|directed| directed.edge != id);
             }
-        } else if !self.merge_sides(&vanishing, id) {
-            return false;
+        } else {
+            self.merge_sides(&replaced);
         }
         self.gone.edges.push(id);
         self.gone.vertices.push(lost);
@@ -43,8 +44,12 @@ impl Surface {
         self.gone.edges.dedup();
         self.gone.facets.sort_unstable();
         self.gone.facets.dedup();
-        self.pack();
-        true
+        let gone = self.gone.edges.clone();
+        let edges = self.pack();
+        let still = |(old, new): (usize, EdgeId)| {
+            gone.binary_search(&EdgeId::from_index(old)).is_err().then_some(new)
+        };
+        Some(edges.into_iter().enumerate().map(still).collect())
     }
 
     /// Which end of an edge stays: the fixed one, or that on more constraints.
@@ -64,7 +69,7 @@ impl Surface {
         }
     }
 
-    fn reattach(&mut self, id: EdgeId, lost: VertexId, kept: VertexId, shift: IVec3) {
+    pub(super) fn reattach(&mut self, id: EdgeId, lost: VertexId, kept: VertexId, shift: IVec3) {
         let edge = &mut self.edges[id];
         let periods = self.periods;
         if edge.ends[0] == lost {
@@ -82,14 +87,19 @@ impl Surface {
         }
     }
 
-    /// Joins the two other edges of each vanishing facet into one. False if that would make a facet with one edge twice.
-    fn merge_sides(&mut self, vanishing: &[(FacetId, usize)], collapsed: EdgeId) -> bool {
+    /// Which edge takes the place of which, and whether turned, when the two other edges of each vanishing facet become one.
+    /// `None` if that would make a facet with one edge twice.
+    fn merged_sides(
+        &self,
+        vanishing: &[(FacetId, usize)],
+        collapsed: EdgeId,
+    ) -> Option<BTreeMap<EdgeId, (EdgeId, bool)>> {
         let mut replaced: BTreeMap<EdgeId, (EdgeId, bool)> = BTreeMap::new();
         for &(facet, at) in vanishing {
             let edges = &self.facets[facet].edges;
             let (b, c) = (edges[(at + 1) % 3], edges[(at + 2) % 3]);
             if b.edge == c.edge || b.edge == collapsed || c.edge == collapsed {
-                return false;
+                return None;
             }
             // b leads from the kept vertex to R, c back: c turned is the same line as b.
             let keep_c = self.edges[c.edge].common.constraints.len()
@@ -99,32 +109,31 @@ impl Surface {
             let turned = from.reversed == to.reversed;
             replaced.insert(from.edge, (to.edge, turned));
         }
-        let mut again = true;
-        let resolve = |mut edge: EdgeId, mut turned: bool| {
-            for _ in 0..replaced.len() + 1 {
-                let Some(&(next, turn)) = replaced.get(&edge) else { return Some((edge, turned)) };
-                edge = next;
-                turned ^= turn;
-            }
-            None
-        };
+        // A chain of replacements must come to an end.
+        let ends = replaced.keys().all(|&edge| resolved(edge, &replaced).is_some());
+        ends.then_some(replaced)
+    }
+
+    fn merge_sides(&mut self, replaced: &BTreeMap<EdgeId, (EdgeId, bool)>) {
         for facet in self.facets.as_mut_slice() {
             for directed in &mut facet.edges {
-                match resolve(directed.edge, false) {
-                    Some((edge, turned)) => {
-                        directed.edge = edge;
-                        directed.reversed ^= turned;
-                    }
-                    None => again = false,
+                if let Some((edge, turned)) = resolved(directed.edge, replaced) {
+                    directed.edge = edge;
+                    directed.reversed ^= turned;
                 }
             }
         }
         self.gone.edges.extend(replaced.keys().copied());
-        again
     }
+}
 
-    /// Whether an id still exists, for loops that delete.
-    pub(crate) fn has_edge(&self, id: EdgeId) -> bool {
-        id.index() < self.edges.len()
+/// The edge that takes the place of one in the end, and whether turned; `None` if there is no end.
+fn resolved(edge: EdgeId, replaced: &BTreeMap<EdgeId, (EdgeId, bool)>) -> Option<(EdgeId, bool)> {
+    let (mut edge, mut turned) = (edge, false);
+    for _ in 0..replaced.len() + 1 {
+        let Some(&(next, turn)) = replaced.get(&edge) else { return Some((edge, turned)) };
+        edge = next;
+        turned ^= turn;
     }
+    None
 }

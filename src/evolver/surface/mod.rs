@@ -10,6 +10,7 @@
 //! | refinement; linear and quadratic elements | `refine.rs` |
 //! | swaps of edges, averages of vertices | `improve.rs` |
 //! | removal of short edges and small facets | `collapse.rs` |
+//! | T1s and pops: of strings, of lines of films, of points of films | `pop_string.rs`, `pop_film.rs`, `pop_vertex.rs` |
 //! | places brought back onto their constraints | `constrain.rs` |
 
 mod build;
@@ -19,6 +20,9 @@ mod constrain;
 mod images;
 mod improve;
 mod neighbours;
+mod pop_film;
+mod pop_string;
+mod pop_vertex;
 mod refine;
 
 pub use check::{Fault, check};

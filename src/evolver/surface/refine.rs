@@ -286,8 +286,9 @@ impl Surface {
         }
     }
 
-    /// Removes vertices, edges and facets that are marked as gone, and middles that no edge has any more.
-    pub(crate) fn pack(&mut self) {
+    /// Removes vertices, edges and facets that are marked as gone, and middles that no edge has any more. The new ids of the old
+    /// edges; those of removed ones mean nothing.
+    pub(crate) fn pack(&mut self) -> Vec<EdgeId> {
         let gone = std::mem::take(&mut self.gone);
         let mut used = vec![false; self.vertices.len()];
         for edge in &self.edges {
@@ -310,6 +311,7 @@ impl Surface {
                 directed.edge = edges[directed.edge.index()];
             }
         }
+        edges
     }
 
     /// Divides a facet into three at its middle.

@@ -85,8 +85,10 @@ pub fn usual_route(space: &FoamSpace, gap: &Gap, count: usize) -> Result<Vec<DVe
             let radius = 0.5 * (radii[0] + radii[1]);
             route(gap, DVec3::X * radius, DVec3::Y * radius, count)
         }
-        FoamSpace::Plane { periods, .. } => route(gap, DVec3::ZERO, DVec3::X * periods[0], count),
-        FoamSpace::Periodic { .. } => {
+        FoamSpace::Plane { periods, .. } | FoamSpace::Box { sides: periods, .. } => {
+            route(gap, DVec3::ZERO, DVec3::X * periods[0], count)
+        }
+        FoamSpace::Periodic { .. } | FoamSpace::Piece { .. } => {
             let [steep, flat] = extremes(gap.middle().as_ref());
             route(gap, flat, steep, count)
         }
@@ -130,9 +132,9 @@ fn extremes(surface: &dyn LevelSet) -> [DVec3; 2] {
 pub fn patch(space: &FoamSpace, gap: &Gap, count: usize) -> Vec<DVec3> {
     match *space {
         FoamSpace::Sphere { radii } => vec![DVec3::Z * 0.5 * (radii[0] + radii[1])],
-        FoamSpace::Plane { .. } => vec![DVec3::ZERO],
+        FoamSpace::Plane { .. } | FoamSpace::Box { .. } => vec![DVec3::ZERO],
         FoamSpace::Torus { ring, tubes } => round_tube(ring, 0.5 * (tubes[0] + tubes[1]), PI, count),
-        FoamSpace::Periodic { .. } => farthest(gap.middle().as_ref(), count),
+        FoamSpace::Periodic { .. } | FoamSpace::Piece { .. } => farthest(gap.middle().as_ref(), count),
     }
 }
 

@@ -4,6 +4,7 @@
 //! may use any mixture of element shapes (`shape.rs`), any number of regions and of films along a border. What lies on a
 //! wall has no element: a wall's share of a volume is integrated on the wall itself (`volume`).
 
+mod rim;
 mod shape;
 mod strips;
 
@@ -141,8 +142,8 @@ impl Complex {
         places[image.node] + self.period.translation(image.shift)
     }
 
-    /// The edges of an element that lie on a wall: the wall, and the edge's nodes in the element's numbering,
-    /// counter-clockwise round the element's normal.
+    /// The edges of an element that lie on a wall of the gap: the wall, and the edge's nodes in the element's numbering,
+    /// counter-clockwise round the element's normal. Planes that cut the gap off are left out: see [`region_anchors`].
     pub fn wall_edges<'a>(
         &'a self,
         element: &'a Element,
@@ -152,6 +153,7 @@ impl Complex {
             self.nodes[first]
                 .walls
                 .iter()
+                .filter(|&&wall| !self.walls[wall].field.cuts_off())
                 .filter(move |wall| {
                     edge.iter().all(|&at| self.nodes[element.nodes[at].node].walls.contains(wall))
                 })
@@ -240,6 +242,31 @@ pub fn region_means(complex: &Complex, places: &Places) -> IndexVec<RegionId, DV
     sums.enumerated()
         .map(|(id, &(sum, count))| if count > 0.0 { sum / count } else { complex.regions[id].anchor })
         .collect()
+}
+
+/// The places that the regions' volumes are measured from, in the frames of their stored anchors: in the midst of each, and
+/// on the planes that cut it off. A cone over a part of a plane from a point of the plane is empty, so such planes add
+/// nothing to a volume; and as they are mirrors, a patch of a wall that is drawn from such a point ends on them by itself.
+#[must_use]
+pub fn region_anchors(complex: &Complex, places: &Places) -> IndexVec<RegionId, DVec3> {
+    let mut anchors = region_means(complex, places);
+    let cuts: Vec<WallId> =
+        complex.walls.enumerated().filter(|(_, wall)| wall.field.cuts_off()).map(|(id, _)| id).collect();
+    if cuts.is_empty() {
+        return anchors;
+    }
+    for film in &complex.films {
+        for image in film.elements.iter().flat_map(|element| &element.nodes) {
+            for &wall in complex.nodes[image.node].walls.iter().filter(|wall| cuts.contains(wall)) {
+                for side in [film.front, film.back] {
+                    // Planes lie across axes without a period.
+                    let anchor = &mut anchors[side.region];
+                    *anchor = complex.walls[wall].project(*anchor).unwrap_or(*anchor);
+                }
+            }
+        }
+    }
+    anchors
 }
 
 impl RegionImage {

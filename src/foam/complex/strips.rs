@@ -1,20 +1,21 @@
 //! A network extruded from wall to wall: one film for each edge, one column of nodes (a Plateau border) for each vertex.
 //!
 //! A film is a strip of `along × through` biquadratic elements; its nodes form a grid of `2·along + 1` columns of
-//! `2·through + 1`. The numbers of the nodes follow from the ids of vertices and edges and do not change in a T1.
+//! `2·through + 1`. The numbers of the nodes follow from the ids of vertices and edges and do not change in a T1. An edge of
+//! the rim, where a plane cuts the gap off, has nodes but no film: they draw the line in which its cell ends (`rim.rs`).
 
 use super::{
-    Complex, Element, Film, FilmId, Motion, Node, NodeId, NodeImage, Places, Region, RegionId, RegionImage,
+    Complex, Element, Film, Motion, Node, NodeId, NodeImage, Places, Region, RegionId, RegionImage,
     RegionKind, Shape, WallId,
 };
 use crate::{
     foam::network::{CellId, EdgeId, HalfEdgeId, Network, VertexId},
     index::{Id, IndexVec},
-    surface::Gap,
+    surface::{Gap, Wall},
 };
 use glam::{DVec3, IVec3};
 use serde::{Deserialize, Serialize};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 /// How finely films are meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,7 +27,7 @@ pub struct Strips {
 }
 
 /// `count` as a number.
-fn real(count: usize) -> f64 {
+pub(super) fn real(count: usize) -> f64 {
     f64::from(crate::index::checked_u32(count))
 }
 
@@ -65,29 +66,40 @@ impl Strips {
         NodeImage { node: NodeId::from_index(index), shift: IVec3::ZERO }
     }
 
-    /// The complex of a network. Films have the ids of their edges, regions those of their cells.
+    /// The complex of a network: films in the order of their edges, regions in that of their cells; first the walls of the
+    /// gap, then the planes that cut it off.
     #[must_use]
     pub fn complex(self, network: &Network, gap: &Gap) -> Complex {
-        let walls: IndexVec<WallId, _> = gap.walls().to_vec().into();
+        let mut walls: IndexVec<WallId, _> = gap.walls().to_vec().into();
+        for &plane in network.planes() {
+            walls.push(Wall { field: Arc::new(plane), level: 0.0 });
+        }
         let regions = network
             .cells()
             .map(|cell| Region { kind: RegionKind::Cell, anchor: network.centre(cell) })
             .collect();
         let mut nodes = IndexVec::new();
         for vertex in network.vertices() {
+            let plane = network.plane_of(vertex).map(|place| WallId::from_index(gap.walls().len() + place));
             for row in 0..self.rows() {
-                nodes.push(Node { walls: self.walls_of(row), motion: self.border_motion(vertex, row) });
+                let walls = self.walls_of(row).into_iter().chain(plane).collect();
+                nodes.push(Node { walls, motion: self.border_motion(vertex, row) });
             }
         }
         for edge in network.edges() {
+            let is_rim = network.is_rim(edge);
             for column in 1..self.columns() - 1 {
                 for row in 0..self.rows() {
-                    let motion = self.inner_motion(network, edge, column, row);
-                    nodes.push(Node { walls: self.walls_of(row), motion });
+                    nodes.push(if is_rim {
+                        Node { walls: Vec::new(), motion: self.rim_motion(network, edge, column, row) }
+                    } else {
+                        let motion = self.inner_motion(network, edge, column, row);
+                        Node { walls: self.walls_of(row), motion }
+                    });
                 }
             }
         }
-        let films = network.edges().map(|edge| self.film(network, edge)).collect();
+        let films = network.films().map(|edge| self.film(network, edge)).collect();
         Complex { period: network.period(), walls, regions, nodes, films }
     }
 
@@ -166,13 +178,14 @@ impl Strips {
         places: &mut Places,
     ) -> Result<(), NoExtrusion> {
         let column = self.straight_column(gap, network.position(vertex))?;
+        let plane = network.plane_of(vertex).map(|place| network.planes()[place]);
         for (row, place) in column.into_iter().enumerate() {
-            places[self.border_node(vertex, row)] = place;
+            places[self.border_node(vertex, row)] = plane.map_or(place, |plane| plane.nearest_to(place));
         }
         Ok(())
     }
 
-    /// Lays the inner nodes of a film afresh between its two columns.
+    /// Lays the inner nodes of a film, or of a line of the rim, afresh between its two columns.
     ///
     /// # Errors
     /// As [`Strips::first_places`].
@@ -183,6 +196,9 @@ impl Strips {
         edge: EdgeId,
         places: &mut Places,
     ) -> Result<(), NoExtrusion> {
+        if network.is_rim(edge) {
+            return self.lay_rim(network, gap, edge, places);
+        }
         let last = self.columns() - 1;
         let side = edge.half_edges()[0];
         let far = network.period().translation(network.target_shift(side));
@@ -213,7 +229,7 @@ impl Strips {
         Ok(())
     }
 
-    fn straight_column(self, gap: &Gap, p: DVec3) -> Result<Vec<DVec3>, NoExtrusion> {
+    pub(super) fn straight_column(self, gap: &Gap, p: DVec3) -> Result<Vec<DVec3>, NoExtrusion> {
         let foot = |wall: usize| gap.walls()[wall].project(p).map_err(|_| NoExtrusion { place: p });
         let (low, high) = (foot(0)?, foot(1)?);
         let last = real(self.rows() - 1);
@@ -257,7 +273,7 @@ impl Strips {
                 .collect();
             largest = largest.max(spread_curve(network, places, &ids));
         }
-        for edge in network.edges() {
+        for edge in network.films() {
             for row in 0..self.rows() {
                 let ids: Vec<NodeImage> =
                     (0..self.columns()).map(|column| self.film_node(network, edge, column, row)).collect();
@@ -371,12 +387,6 @@ fn spread_curve(network: &Network, places: &mut Places, ids: &[NodeImage]) -> f6
     largest
 }
 
-/// The film of an edge.
-impl From<EdgeId> for FilmId {
-    fn from(edge: EdgeId) -> Self {
-        Self::from_index(edge.index())
-    }
-}
 /// The masters of an inner node of a strip, by its column and row and the last of each: the two borders, and inside the film
 /// its edges on the walls, too, as a Coons patch.
 pub(in crate::foam) fn coons(

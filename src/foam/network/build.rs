@@ -1,6 +1,6 @@
 //! A network from lists, and its check.
 
-use super::{Cell, CellId, HalfEdge, HalfEdgeId, Network, NetworkDefect, Vertex, VertexId, laws};
+use super::{Cell, CellId, HalfEdge, HalfEdgeId, Network, NetworkDefect, Vertex, VertexId, laws, rim::Rim};
 use crate::{
     index::{Id, IndexVec},
     surface::Period,
@@ -68,6 +68,7 @@ impl Network {
         found.extend(laws::valence::check(self));
         found.extend(laws::euler::check(self));
         found.extend(laws::contact::check(self));
+        found.extend(laws::rim::check(self));
         found
     }
 }
@@ -149,5 +150,5 @@ fn assemble(
             side: sides[id.index()].first().copied().unwrap_or(first),
         })
         .collect();
-    Network { period, euler_characteristic, vertices: places, cells, half_edges }
+    Network { period, euler_characteristic, vertices: places, cells, half_edges, rim: Rim::default() }
 }

@@ -16,6 +16,9 @@ pub enum FlipRefusal {
     /// The same cell lies at both ends: it would touch itself.
     #[error("cell {0:?} lies at both ends and would touch itself")]
     SameCell(CellId),
+    /// The film ends at planes on both sides: the outside would touch itself.
+    #[error("both ends of the film lie on planes that cut the foam off")]
+    Outside,
 }
 
 /// Why a T2 is refused. Nothing has changed.
@@ -66,6 +69,12 @@ impl Network {
         let (c, d) = (self.cell(at_origin), self.cell(at_target));
         if c == d {
             return Err(FlipRefusal::SameCell(c));
+        }
+        match (self.is_outside(c), self.is_outside(d)) {
+            (false, false) => {}
+            (true, true) => return Err(FlipRefusal::Outside),
+            // A cell may end at the rim twice, at two planes with another cell in the corner between them.
+            _ => return Ok(()),
         }
         let between = self.target_shift(h) + self.cell_shift(at_target) - self.cell_shift(at_origin);
         let touch =
@@ -138,7 +147,8 @@ impl Network {
         }
         let mut next_cell = 0;
         let new_cell: IndexVec<CellId, Option<CellId>> = self
-            .cells()
+            .cells
+            .ids()
             .map(|id| {
                 (id != cell).then(|| {
                     next_cell += 1;
@@ -171,6 +181,7 @@ impl Network {
             })
             .collect();
         let network = Self::new(self.period, self.euler_characteristic, &vertices, &cells)
+            .and_then(|network| network.with_rim(self.rim.planes.clone(), self.rim.outside))
             .map_err(|defects| RemoveRefusal::Defects { cell, defects })?;
         Ok(Removed { network, cells: new_cell, vertices: new_vertex })
     }

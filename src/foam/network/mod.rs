@@ -6,11 +6,13 @@
 //! its vertices and the centres of its cells; films are made from it by extrusion (`complex`).
 //!
 //! The laws are one file each in `laws/`; [`Network::new`] and [`Network::defects`] report every violation with its data.
-//! T1 and T2 are in `flip.rs`, the only place where neighbours change.
+//! T1 and T2 are in `flip.rs`, the only place where neighbours change. Where planes cut the surface off, `rim.rs` closes the
+//! network by the outside.
 
 mod build;
 mod flip;
 mod laws;
+mod rim;
 
 pub use build::{CellRing, RingCorner};
 pub use flip::{FlipRefusal, RemoveRefusal, Removed};
@@ -89,7 +91,8 @@ struct HalfEdge {
     cell_shift: IVec3,
 }
 
-/// The half-edge graph of the cells on a closed middle surface, or on one period of a periodic one.
+/// The half-edge graph of the cells on a closed middle surface, on one period of a periodic one, or on a piece that planes cut
+/// off.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Network {
     period: Period,
@@ -97,6 +100,8 @@ pub struct Network {
     vertices: IndexVec<VertexId, Vertex>,
     cells: IndexVec<CellId, Cell>,
     half_edges: IndexVec<HalfEdgeId, HalfEdge>,
+    #[serde(default)]
+    rim: rim::Rim,
 }
 
 impl Network {
@@ -106,15 +111,15 @@ impl Network {
         self.period
     }
 
-    /// The Euler characteristic χ of the surface (of one period of it).
+    /// The Euler characteristic χ of the surface (of one period of it); of a piece, with the outside that closes it.
     #[must_use]
     pub fn euler_characteristic(&self) -> i32 {
         self.euler_characteristic
     }
 
-    /// All cells.
+    /// All cells, without the outside.
     pub fn cells(&self) -> impl ExactSizeIterator<Item = CellId> + DoubleEndedIterator + use<> {
-        self.cells.ids()
+        (0..self.cells.len().saturating_sub(self.rim.outside)).map(CellId::from_index)
     }
 
     /// All vertices.
@@ -167,7 +172,7 @@ impl Network {
         self.half_edges[side].target_shift
     }
 
-    /// The cell on the left.
+    /// The cell on the left, or the outside.
     #[must_use]
     pub fn cell(&self, side: HalfEdgeId) -> CellId {
         self.half_edges[side].cell
@@ -191,7 +196,7 @@ impl Network {
         self.half_edges[side].previous
     }
 
-    /// The cell across a side.
+    /// The cell across a side, or the outside.
     #[must_use]
     pub fn neighbour(&self, side: HalfEdgeId) -> CellId {
         self.cell(side.twin())
@@ -250,7 +255,7 @@ impl Network {
             - self.position(self.origin(side))
     }
 
-    /// The cells as rings, in the form that [`Network::new`] takes.
+    /// The cells as rings, the outside last, in the form that [`Network::new`] takes.
     #[must_use]
     pub fn rings(&self) -> IndexVec<CellId, CellRing> {
         self.cells

@@ -1,6 +1,6 @@
 //! What can be wrong with a partition.
 
-use super::PartitionCell;
+use super::{Beyond, PartitionCell, Side};
 use crate::{
     foam::network::{CellId, NetworkDefect},
     surface::WallSide,
@@ -77,9 +77,26 @@ pub enum PartitionDefect {
         /// The gap, by quadrature.
         gap: f64,
     },
-    /// The domain has plane walls, which the network cannot express.
-    #[error("the cells end at plane walls: they have no closed network on the middle surface")]
-    OpenDomain,
+    /// The cell ends at two planes that face each other.
+    #[error("cell {cell:?} reaches from one cut plane to the one that faces it: there are too few cells")]
+    Spans {
+        /// The cell.
+        cell: CellId,
+    },
+    /// The cell covers more than one corner of the domain.
+    #[error("cell {cell:?} covers two corners of the domain: there are too few cells")]
+    Corners {
+        /// The cell.
+        cell: CellId,
+    },
+    /// The lines in which planes cut the middle surface do not close.
+    #[error(
+        "the cut beside cell {cell:?} closes in no line: it winds round the period, or one cell has all of it"
+    )]
+    OpenRim {
+        /// The cell.
+        cell: CellId,
+    },
     /// The cells on the middle surface are no network.
     #[error("the cells do not cover the middle surface properly: {0}")]
     Network(#[from] NetworkDefect),
@@ -99,13 +116,23 @@ pub(super) fn of_cell(id: CellId, cell: &PartitionCell) -> Vec<PartitionDefect> 
         defects.push(PartitionDefect::Pieces { cell: id, pieces: cell.pieces });
     }
     for wall in WallSide::BOTH {
-        let patches = cell.faces.iter().filter(|face| face.beyond == super::Beyond::Wall(wall)).count();
+        let patches = cell.faces.iter().filter(|face| face.beyond == Beyond::Wall(wall)).count();
         if patches != 1 {
             defects.push(PartitionDefect::Patches { cell: id, wall, patches });
         }
     }
     if cell.sections.len() != 1 {
         defects.push(PartitionDefect::Sections { cell: id, loops: cell.sections.len() });
+    }
+    let sides: Vec<&Side> = cell.sections.iter().flatten().collect();
+    let ends_at = |end: Beyond| sides.iter().any(|side| side.beyond == end);
+    let faces = |high| (0_u8..3).map(move |axis| Beyond::Plane { axis, high });
+    if faces(false).zip(faces(true)).any(|(low, high)| ends_at(low) && ends_at(high)) {
+        defects.push(PartitionDefect::Spans { cell: id });
+    }
+    let is_plane = |beyond| matches!(beyond, Beyond::Plane { .. });
+    if sides.iter().filter(|side| is_plane(side.before) && is_plane(side.beyond)).count() > 1 {
+        defects.push(PartitionDefect::Corners { cell: id });
     }
     if !cell.volume.is_finite() {
         defects.push(PartitionDefect::Curved { cell: id });

@@ -11,7 +11,7 @@
 //! | where lines and planes meet the walls | `levels.rs` |
 //! | the polyhedron clipped by the walls: loops | `clip.rs` |
 //! | volume by quadrature on the true walls | `measure.rs` |
-//! | the network on the middle surface | `network.rs` |
+//! | the network on the middle surface, and its rim where planes cut it off | `network.rs`, `rim.rs` |
 //! | a cell as polygons, for export | `mesh.rs` |
 //! | seeds moved to the centres of their cells | `lloyd.rs` |
 //! | what can be wrong | `defect.rs` |
@@ -34,6 +34,7 @@ mod measure;
 mod mesh;
 mod network;
 pub(in crate::foam) mod polyhedron;
+mod rim;
 
 pub use defect::PartitionDefect;
 pub use mesh::CellMesh;
@@ -124,7 +125,10 @@ impl PartitionCell {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Partition {
     domain: Domain,
+    /// Of one period of the middle surface.
     euler_characteristic: i32,
+    /// How many periods of the middle surface the domain holds.
+    periods: f64,
     cells: IndexVec<CellId, PartitionCell>,
 }
 
@@ -147,8 +151,12 @@ impl Partition {
             return Err(defects);
         }
         defects.extend(cells.enumerated().flat_map(|(id, cell)| defect::of_cell(id, cell)));
-        let partition =
-            Self { domain: *domain, euler_characteristic: gap.middle().euler_characteristic(), cells };
+        let partition = Self {
+            domain: *domain,
+            euler_characteristic: gap.middle().euler_characteristic(),
+            periods: domain.periods_of(gap.middle().as_ref()),
+            cells,
+        };
         defects.extend(defect::of_volume(partition.volume(), gap_volume(gap, domain)));
         if defects.is_empty() { Ok(partition) } else { Err(defects) }
     }

@@ -162,7 +162,7 @@ impl Annealing<'_> {
                 let mut along = || self.random.random_range(-1.0..1.0);
                 let moved = network.centre(cell) + reach * DVec3::new(along(), along(), along());
                 let place = self.gap.middle().project(moved, 0.0).ok()?;
-                Some(self.domain.wrap(place).0)
+                Some(self.domain.reflected_inside(self.domain.wrap(place).0))
             })
             .collect::<Option<_>>()?;
         let network: Network = Partition::new(self.gap, self.domain, &centres).ok()?.network().ok()?;

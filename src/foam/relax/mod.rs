@@ -200,7 +200,7 @@ const MOST_TURN: f64 = 0.9;
 /// How many elements along each film follow the walls.
 fn elements_along(state: &State, gap: &Gap) -> usize {
     let network = &state.network;
-    let turn = network.edges().map(|edge| {
+    let turn = network.films().map(|edge| {
         let side = edge.half_edges()[0];
         let mut line = state.side_line(side, state.rows() / 2);
         line.extend(state.side_line(network.next(side), state.rows() / 2).first());
@@ -289,6 +289,12 @@ const DAMPED: f64 = 0.9;
 /// alone will not settle.
 const SPREAD_FOR: usize = 30;
 
+/// A film's end that has slid round a corner by this part of the cell width changes its plane at once; less may be the way
+/// of one step.
+const SLID: f64 = 0.02;
+/// How often films turn round corners before that no longer counts as progress.
+const MOST_TURNS: usize = 30;
+
 /// How often crumpled films are laid anew before a run counts as stalled.
 const MOST_LAID_ANEW: usize = 3;
 
@@ -300,12 +306,14 @@ struct Run<'a> {
     residuals: Residuals,
     unstable: usize,
     laid_anew: usize,
+    turned: usize,
     refined: bool,
 }
 
 /// Why Newton steps were halted.
 enum Halt {
     Flip,
+    Turn,
     Spread,
     Interrupt,
 }
@@ -314,10 +322,21 @@ impl<'a> Run<'a> {
     fn new(state: State, gap: &'a Gap, settings: &'a RelaxSettings) -> Result<Self, RelaxError> {
         let descent = state.descent(gap)?;
         let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
-        Ok(Self { gap, settings, state, descent, residuals, unstable: 0, laid_anew: 0, refined: false })
+        Ok(Self {
+            gap,
+            settings,
+            state,
+            descent,
+            residuals,
+            unstable: 0,
+            laid_anew: 0,
+            turned: 0,
+            refined: false,
+        })
     }
 
-    fn ended(self, stop: Stop) -> Relaxed {
+    fn ended(mut self, stop: Stop) -> Relaxed {
+        self.state.lay_rim(self.gap);
         Relaxed { state: self.state, stop, residuals: self.residuals, unstable: self.unstable }
     }
 
@@ -356,6 +375,8 @@ impl<'a> Run<'a> {
                     vanishing = topology::vanishing_edges(state, &before, flip_below);
                     halt = if !vanishing.is_empty() {
                         Some(Halt::Flip)
+                    } else if topology::slid_round(state, SLID * settings.length).is_some() {
+                        Some(Halt::Turn)
                     } else {
                         (told.fraction < DAMPED && state.steps < patience).then_some(Halt::Spread)
                     };
@@ -372,6 +393,7 @@ impl<'a> Run<'a> {
             (self.residuals, self.unstable) = (descended.residuals, descended.unstable);
             let residual = self.residuals.force;
             match (descended.ending, halt) {
+                (Ending::Converged, _) if self.turn_corners()? => patience = steps + SPREAD_FOR,
                 (Ending::Converged, _) => return Ok(None),
                 (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
                 (Ending::Stalled, _) if self.lay_anew()? => patience = steps + SPREAD_FOR,
@@ -380,6 +402,8 @@ impl<'a> Run<'a> {
                     self.flip(&vanishing)?;
                     patience = steps + SPREAD_FOR;
                 }
+                (Ending::Halted, Some(Halt::Turn)) if self.turn_corners()? => patience = steps + SPREAD_FOR,
+                (Ending::Halted, Some(Halt::Turn)) => return Ok(Some(Stop::Stalled { steps, residual })),
                 (Ending::Halted, Some(Halt::Spread)) => {
                     self.spread();
                 }
@@ -400,6 +424,21 @@ impl<'a> Run<'a> {
         }
         self.descent = self.state.descent(self.gap)?;
         Ok(())
+    }
+
+    /// Lets films that have slid round a corner between two planes end on the other one. Gives whether there were any.
+    fn turn_corners(&mut self) -> Result<bool, RelaxError> {
+        let mut turned = false;
+        while self.turned < MOST_TURNS
+            && let Some((vertex, plane)) = topology::slid_round(&self.state, 0.0)
+        {
+            self.turned += 1;
+            turned |= topology::turn_corner(&mut self.state, self.gap, vertex, plane);
+        }
+        if turned {
+            self.descent = self.state.descent(self.gap)?;
+        }
+        Ok(turned)
     }
 
     /// Films that crumpled on the way from a rough start are laid anew between vertices that were drawn apart; who touches
@@ -461,5 +500,7 @@ impl<'a> Run<'a> {
     }
 }
 
+#[cfg(test)]
+mod cut_tests;
 #[cfg(test)]
 mod tests;

@@ -109,14 +109,11 @@ impl State {
 
     /// The width of a cell: the root of the area of a regular hexagon with the mean edge.
     pub(crate) fn cell_width(&self) -> f64 {
-        let edges = self.network.edges();
-        let count = f64::from(crate::index::checked_u32(edges.len()));
-        let total: f64 = edges
-            .map(|edge| {
-                let (a, b) = self.chord(edge);
-                a.distance(b)
-            })
-            .sum();
+        let chords = self.network.films().map(|edge| {
+            let (a, b) = self.chord(edge);
+            a.distance(b)
+        });
+        let (total, count) = chords.fold((0.0, 0.0), |(total, count), chord| (total + chord, count + 1.0));
         // A regular hexagon of area 1 has sides of √(2/(3√3)).
         let side = (2.0 / (3.0 * 3.0_f64.sqrt())).sqrt();
         total / count / side
@@ -132,6 +129,13 @@ impl State {
             let outline = self.network.outline(cell);
             let count = f64::from(crate::index::checked_u32(outline.len()));
             self.network.set_centre(cell, outline.iter().sum::<DVec3>() / count);
+        }
+    }
+
+    /// Lays the lines of the rim where the films end now. A line that finds no wall stays where it was.
+    pub(crate) fn lay_rim(&mut self, gap: &Gap) {
+        for edge in self.network.rim() {
+            let _ = self.strips.lay_film(&self.network, gap, edge, &mut self.places);
         }
     }
 

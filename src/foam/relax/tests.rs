@@ -154,7 +154,7 @@ fn foam(space: FoamSpace, cells: usize, settings: &RelaxSettings) -> Result<(Rel
     let mut seeds = SeedSettings::new(cells, 1);
     seeds.anneal.sweeps = 100;
     let start = start(&gap, &domain, &seeds, &mut |_| ControlFlow::Continue(()))?;
-    let network = start.network.ok_or("no network")?;
+    let network = start.network;
     let relaxed = relax(network, &gap, settings, &mut |_| ControlFlow::Continue(()))?;
     Ok((relaxed, gap))
 }
@@ -227,7 +227,7 @@ fn random_cells_between_plates_settle_by_t1s_and_keep_every_law() -> Result<(), 
         let mut seeds = SeedSettings::new(36, seed);
         (seeds.anneal.sweeps, seeds.polish.steps) = (0, 0);
         let start = start(&gap, &domain, &seeds, &mut |_| ControlFlow::Continue(()))?;
-        let network = start.network.ok_or("no network")?;
+        let network = start.network;
         let settings = RelaxSettings::default();
         let relaxed = relax(network, &gap, &settings, &mut |_| ControlFlow::Continue(()))?;
         assert!(matches!(relaxed.stop, Stop::Converged { .. }), "seed {seed}: {:?}", relaxed.stop);

@@ -64,7 +64,7 @@ const PINCHED: f64 = 3.0;
 /// Whether straight films through the network are too crooked to start from.
 pub(super) fn is_steep(state: &State) -> bool {
     let width = state.cell_width();
-    state.network.edges().any(|edge| {
+    state.network.films().any(|edge| {
         let [lower, middle, upper] = heights(state, edge).map(|(from, to)| from.distance(to));
         middle > LONG_ENOUGH * width && lower.min(upper) < STEEP * middle
     })
@@ -85,7 +85,7 @@ fn pinch(state: &State) -> Option<Pinch> {
     let width = state.cell_width();
     state
         .network
-        .edges()
+        .films()
         .filter_map(|edge| {
             let [lower, _, upper] = heights(state, edge);
             let (on_lower, on_upper) = (lower.0.distance(lower.1), upper.0.distance(upper.1));

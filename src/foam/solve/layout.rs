@@ -58,7 +58,7 @@ impl Layout {
             .map(|node| {
                 let own = match node.motion {
                     Motion::Free => 3 - node.walls.len().min(3),
-                    Motion::Border(_) => 2,
+                    Motion::Border(_) => 2 - node.walls.len().min(2),
                     Motion::Inner(_) => 0,
                 };
                 count += own;

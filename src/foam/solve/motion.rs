@@ -26,6 +26,22 @@ pub(super) fn tangent_basis(complex: &Complex, node: &Node, p: DVec3) -> Vec<DVe
     }
 }
 
+/// Orthonormal directions in which a border's node moves on its own: across the border's tangent, and on its wall if it has
+/// one, as where a film ends on a plane that cuts the gap off.
+fn across_border(complex: &Complex, node: &Node, p: DVec3, along: DVec3) -> Vec<DVec3> {
+    match node.walls[..] {
+        [] => {
+            let (u, v) = along.any_orthonormal_pair();
+            vec![u, v]
+        }
+        [wall] => {
+            let normal = complex.walls[wall].field.normal(p);
+            vec![normal.cross(along).normalize_or(normal.any_orthonormal_vector())]
+        }
+        _ => Vec::new(),
+    }
+}
+
 /// The projection onto the tangents of a node's walls.
 pub(super) fn tangent_projection(complex: &Complex, node: &Node, p: DVec3) -> DMat3 {
     match node.walls[..] {
@@ -120,10 +136,7 @@ impl Motions {
                 let first = layout.freedoms[id].0;
                 let own = match node.motion {
                     Motion::Free => tangent_basis(complex, node, places[id]),
-                    Motion::Border(_) => {
-                        let (u, v) = frames.axis(id).any_orthonormal_pair();
-                        vec![u, v]
-                    }
+                    Motion::Border(_) => across_border(complex, node, places[id], frames.axis(id)),
                     Motion::Inner(_) => Vec::new(),
                 };
                 own.into_iter().enumerate().map(|(at, direction)| (first + at, direction)).collect()

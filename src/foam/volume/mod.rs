@@ -7,6 +7,8 @@
 //! what has changed since is the strip between the reference edge and the present one, for which gradient and Hessian are
 //! exact and need no more than second derivatives of the wall's level function.
 //!
+//! Planes that cut the gap off need no integral: the origin of a region that ends at some lies on all of them.
+//!
 //! Both regions beside a film see the same strip with opposite signs, so the sum of all volumes cannot drift.
 
 mod reference;

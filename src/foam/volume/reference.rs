@@ -3,7 +3,7 @@
 use super::{
     super::complex::{
         Complex, CurvePoint, Element, Film, NodeId, Places, RegionId, RegionKind, WallId, curve_points,
-        region_means,
+        region_anchors,
     },
     wall::height,
 };
@@ -68,7 +68,7 @@ impl Reference {
         Self {
             places: places.clone(),
             directions,
-            anchors: region_means(complex, places),
+            anchors: region_anchors(complex, places),
             offsets: IndexVec::from_elem(0.0, complex.regions.len()),
         }
     }

@@ -3,6 +3,7 @@
 pub(super) mod contact;
 pub(super) mod euler;
 pub(super) mod pairing;
+pub(super) mod rim;
 pub(super) mod ring;
 pub(super) mod valence;
 
@@ -125,5 +126,11 @@ pub enum NetworkDefect {
         cell: CellId,
         /// The image that it touches.
         shift: IVec3,
+    },
+    /// An outside that is none.
+    #[error("the network's rim is damaged: {what}")]
+    Rim {
+        /// What does not hold.
+        what: &'static str,
     },
 }
