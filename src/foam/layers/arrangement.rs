@@ -81,6 +81,7 @@ pub fn sheets(
     progress: &mut Progress<'_>,
 ) -> Result<Sheets, NoLayers> {
     match (arrangement, *space) {
+        (_, FoamSpace::Box { .. } | FoamSpace::Piece { .. }) => Err(NoLayers::Walled { space: *space }),
         (Arrangement::Annealed, _) => annealed(gap, cells, seed, progress),
         (_, FoamSpace::Plane { periods, height }) => rows(arrangement, periods, height, cells),
         _ => Err(NoLayers::Curved { pattern: arrangement.name(), surface: gap.middle().name() }),

@@ -46,7 +46,7 @@ pub use figures::{LayerFigures, corner_angles, layer_figures, tetrahedral_angle}
 pub use films::{LayerFilms, Side, layer_films};
 pub use relax::{LayerSettings, Layers, relaxed};
 
-use crate::foam::{seeds::SeedError, solve::FactorError};
+use crate::foam::{seeds::SeedError, setup::FoamSpace, solve::FactorError};
 use glam::DVec3;
 
 /// Why there is no two-layer foam.
@@ -75,6 +75,14 @@ pub enum NoLayers {
         pattern: &'static str,
         /// The surface.
         surface: &'static str,
+    },
+    /// The space ends at plane walls.
+    #[error(
+        "two layers are made on whole surfaces and periods, but {space} ends at plane walls: give the surface itself, such as --surface schwarz-p with its period and walls"
+    )]
+    Walled {
+        /// The space.
+        space: FoamSpace,
     },
     /// Seeds coincide.
     #[error("cells too close to each other at {place}: no polyhedron is left between them")]
