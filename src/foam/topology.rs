@@ -218,8 +218,8 @@ fn lay_round(state: &mut State, gap: &Gap, vertices: &[VertexId]) -> Option<()> 
 #[must_use]
 pub fn slid_round(state: &State, margin: f64) -> Option<(VertexId, usize)> {
     let network = &state.network;
-    let ends = network.rim().flat_map(|edge| edge.half_edges().map(|side| network.origin(side)));
-    ends.into_iter().find_map(|vertex| {
+    let mut ends = network.rim().flat_map(|edge| edge.half_edges().map(|side| network.origin(side)));
+    ends.find_map(|vertex| {
         let own = network.plane_of(vertex);
         let place = state.places[state.middle_node(vertex)];
         let beyond =
