@@ -64,8 +64,9 @@ impl LevelSet for CutPlane {
         (f64::NEG_INFINITY, f64::INFINITY)
     }
 
+    // As ∫ K dA / 2π says, and as for a plane with periods: the plane has no end to be counted.
     fn euler_characteristic(&self) -> i32 {
-        1
+        0
     }
 
     fn is_distance(&self) -> bool {
