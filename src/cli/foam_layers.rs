@@ -235,7 +235,7 @@ fn in_figures(defects: &Companions) -> Vec<Line> {
             "defects",
             format!("{} in the lower layer, {} in the upper", defects.defects[0], defects.defects[1]),
         ),
-        ("charges of touching cells", format!("correlation {:+.3}", defects.contact_correlation)),
+        ("charges that touch", format!("correlation {:+.3}", defects.contact_correlation)),
         ("charges over each other", chance(&defects.correlation)),
         ("nearest defect opposite", chance(&defects.nearest)),
     ]

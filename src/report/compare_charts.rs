@@ -385,6 +385,13 @@ pub fn curvature(comparison: &Comparison) -> Result<Option<Figure>, ChartError> 
     Ok(Some(figure))
 }
 
+/// A number of cells if it is 1, 2 or 5 of a power of ten: others would crowd a logarithmic axis.
+fn round_number(value: f64) -> String {
+    let text = format!("{value:.0}");
+    let first = text.trim_end_matches('0');
+    if ["1", "2", "5"].contains(&first) { text } else { String::new() }
+}
+
 /// Power against the number of cells, on a logarithmic scale: the share of pairs that were found different.
 ///
 /// # Errors
@@ -410,7 +417,7 @@ pub fn power_chart(curves: &[(&str, Vec<(f64, f64)>)]) -> Result<Figure, ChartEr
             .y_desc("share of pairs found different")
             .axis_desc_style(text(16))
             .label_style(text(15))
-            .x_label_formatter(&|value| format!("{value:.0}"))
+            .x_label_formatter(&|value| round_number(*value))
             .y_label_formatter(&|value| format!("{value:.1}"))
             .bold_line_style(rgb(INK).mix(0.12))
             .light_line_style(WHITE)

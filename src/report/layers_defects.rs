@@ -22,7 +22,7 @@ const SHEET: [u32; 2] = [1800, 1020];
 const HEAD: u32 = 96;
 const FOOT: u32 = 70;
 /// Triangles along the longest axis of the surface.
-const CELLS: f64 = 220.0;
+const CELLS: f64 = 400.0;
 /// Two cells are parted by a dark seam where their middles are as far as this, in spacings.
 const SEAM: f64 = 0.045;
 /// The radius of a ball that stands for a defect of the other layer, in spacings.
@@ -44,12 +44,14 @@ pub fn picture(layers: &[Charged; 2], gap: &Gap, spacing: f64, title: &str) -> R
         ["cells of the lower layer, defects of the upper", "cells of the upper layer, defects of the lower"];
     for (here, caption) in captions.into_iter().enumerate() {
         let left = 0.5 * sheet_width * f64::from(u32::from(here == 1));
-        let points = triangles.iter().flatten().copied();
+        let balls: Vec<(DVec3, f64)> = layers[1 - here].defects().collect();
+        let of_balls = balls.iter().flat_map(|(place, _)| ball(*place, BALL * spacing)).flatten();
+        let points = triangles.iter().flatten().copied().chain(of_balls.map(|corner| corner.position));
         let aspect = f64::from(width) / f64::from(height);
         let (eye, up) = towards_eye(surface);
         let mut canvas = Canvas::new(width, height, Camera::fit(points, eye, up, aspect));
         paint(&mut canvas, &triangles, &layers[here], surface, spacing);
-        for (place, charge) in layers[1 - here].defects() {
+        for (place, charge) in balls {
             for corners in ball(place, BALL * spacing) {
                 canvas.triangle(corners, of_charge(charge), 1.0);
             }

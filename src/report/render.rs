@@ -33,12 +33,7 @@ impl Camera {
 
     /// As [`Camera::new`], with the size chosen so that all `points` are in view of a picture of this aspect (width over
     /// height), with a margin.
-    pub fn fit(
-        points: impl Iterator<Item = DVec3> + Clone,
-        towards_eye: DVec3,
-        up: DVec3,
-        aspect: f64,
-    ) -> Self {
+    pub fn fit(points: impl Iterator<Item = DVec3>, towards_eye: DVec3, up: DVec3, aspect: f64) -> Self {
         let mut camera = Self::new(DVec3::ZERO, towards_eye, up, 1.0);
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in points {
