@@ -135,7 +135,7 @@ pub(super) struct FoamArguments {
     #[command(flatten)]
     pub(super) space: SpaceArguments,
 
-    /// The gap of an enclosure's recipe (TOML), as much of it as is printed; lengths are then in mm
+    /// The gap of an enclosure's recipe (TOML), as much of it as is printed (for two layers: one period); lengths are then in mm
     #[arg(long, value_name = "FILE", conflicts_with_all = ["surface", "period", "delta", "parallel"], help_heading = "Space")]
     pub(super) recipe: Option<PathBuf>,
 

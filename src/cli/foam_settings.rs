@@ -92,12 +92,16 @@ impl FoamSettings {
             OpenFacesName::Periodic => OpenFaces::Periodic,
         });
         let space = match &arguments.recipe {
-            Some(file) => recipe_space(file, open_faces.unwrap_or(OpenFaces::Walls))
-                .map_err(|fault| Faults(vec![fault]))?,
+            Some(file) => {
+                recipe_space(file, open_faces, arguments.layers).map_err(|fault| Faults(vec![fault]))?
+            }
             None => ended(space(&arguments.space, &mut faults), open_faces, &mut faults),
         };
         if arguments.layers == 2 && matches!(space, FoamSpace::Piece { .. } | FoamSpace::Box { .. }) {
-            faults.push("two layers of cells need a period: plane walls are for one layer".to_owned());
+            faults.push(
+                "two layers of cells need a period: plane walls are for one layer; leave --open-faces out"
+                    .to_owned(),
+            );
         }
         let mut cells = arguments.cells.unwrap_or(DEFAULT_CELLS);
         match space.gap() {
@@ -218,17 +222,20 @@ fn ended(space: FoamSpace, open_faces: Option<OpenFaces>, faults: &mut Vec<Strin
     }
 }
 
-/// The gap that an enclosure's recipe describes, as much of it as is printed, in mm.
-fn recipe_space(file: &Path, open_faces: OpenFaces) -> Result<FoamSpace, String> {
+/// The gap that an enclosure's recipe describes, in mm: as much of it as is printed, closed by plane walls unless said otherwise;
+/// for two layers, which know no plane walls, one period of it.
+fn recipe_space(file: &Path, open_faces: Option<OpenFaces>, layers: u8) -> Result<FoamSpace, String> {
     let named = |error: &dyn fmt::Display| format!("{}: {error}", file.display());
     let text = fs::read_to_string(file).map_err(|error| named(&error))?;
     let recipe = Recipe::parse(&text).map_err(|error| named(&error))?;
     let design = Design::new(&recipe).map_err(|error| named(&error))?;
     let (low, high) = (design.region.low, design.region.high);
     let one_period = (0..3).all(|axis| high[axis] - low[axis] == 2);
-    if one_period && open_faces == OpenFaces::Periodic {
+    let periodic = open_faces == Some(OpenFaces::Periodic);
+    if periodic && (one_period || layers == 2) || layers == 2 && open_faces.is_none() {
         return Ok(space_of(&design));
     }
+    let open_faces = open_faces.unwrap_or(OpenFaces::Walls);
     Ok(FoamSpace::Piece { period: design.period.0, walls: walls_of(&design), low, high, open_faces })
 }
 
