@@ -25,7 +25,7 @@ type Maker = fn(cells: usize, share: f64, seed: u64) -> Result<CellPattern, Box<
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let folder = std::env::args()
         .skip(1)
-        .find(|argument| argument != "--bench")
+        .find(|argument| !argument.starts_with('-'))
         .ok_or("name a folder for the figure")?;
     let makers: [(&str, Maker); 2] = [("independent cells", independent), ("5-7 pairs", flipped)];
     println!("share of {PAIRS} true nulls that are rejected at {LEVEL}, with 85 % hexagons");
