@@ -4,8 +4,8 @@ use super::tally::Tally;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
-/// All divisions are tried where there are no more than this.
-const EXHAUSTIBLE: u64 = 20_000;
+/// All divisions are tried where there are no more than this: as many as are drawn at random otherwise.
+const EXHAUSTIBLE: u64 = 10_000;
 
 /// What a run over the divisions found.
 pub(super) struct Permuted {

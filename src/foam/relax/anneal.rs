@@ -6,7 +6,7 @@
 //! descent at temperature 0 over the local minima: basin hopping as in D. Wales and J. Doye, J. Phys. Chem. A 101, 1997).
 //! The lowest of all is relaxed to the end on the final mesh.
 
-use super::{COARSE_TOLERANCE, Progress, RelaxError, RelaxSettings, Relaxed, Run, State, Stop, laid, resume};
+use super::{Progress, RelaxError, RelaxSettings, Relaxed, Run, State, Stop, laid, resume};
 use crate::{
     foam::{
         domain::Domain,
@@ -131,7 +131,7 @@ impl Annealing<'_> {
         let settings = RelaxSettings { step_limit: CYCLE_STEPS, ..self.relax.clone() };
         let mut run = Run::new(state.clone(), self.gap, &settings).ok()?;
         let watch: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()> = &mut |_| ControlFlow::Continue(());
-        if run.newton(COARSE_TOLERANCE, watch).ok()?.is_some() {
+        if run.coarsely(watch).ok()?.is_some() {
             return None;
         }
         run.state.follow_films();

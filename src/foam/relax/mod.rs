@@ -6,7 +6,8 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | the whole run | this page |
+//! | the first network, settings and results | this page |
+//! | the run of Newton steps, and what is done between them | `run.rs` |
 //! | what a run is in the middle of, as data | `state.rs` |
 //! | least energy of any film complex, topology fixed | `descend.rs` |
 //! | walls far apart: relaxed in a narrow gap that is widened | `widen.rs` |
@@ -16,6 +17,7 @@
 mod anneal;
 mod descend;
 mod extrapolate;
+mod run;
 mod state;
 mod widen;
 
@@ -27,13 +29,13 @@ pub use widen::Pinch;
 
 use super::{
     complex::{NoExtrusion, Strips},
-    network::{CellId, EdgeId, Network, VertexId},
+    network::{CellId, Network},
     solve::{FactorError, Residuals},
-    topology,
 };
 use crate::{index::IndexVec, surface::Gap};
+use run::Run;
 use serde::{Deserialize, Serialize};
-use std::{collections::BTreeSet, ops::ControlFlow};
+use std::ops::ControlFlow;
 
 /// What can be set about a relaxation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -256,12 +258,7 @@ fn go_on(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
     let mut run = Run::new(state, gap, settings)?;
-    // The coarse mesh need not converge further than T1s can still happen.
-    let stop = run.newton(COARSE_TOLERANCE, progress)?;
-    let stop = match stop {
-        Some(stop) => stop,
-        None => run.finish(progress)?,
-    };
+    let stop = run.through(progress)?;
     Ok(run.ended(stop))
 }
 
@@ -271,233 +268,6 @@ fn go_on(
 /// [`FactorError`] if the system cannot be factored.
 pub fn lowest_eigenvalue(state: &State, gap: &Gap) -> Result<f64, FactorError> {
     Ok(state.descent(gap)?.lowest_mode()?.eigenvalue)
-}
-
-/// The residual at which the mesh is refined: T1s have ended there, and two more steps would converge the coarse mesh.
-const COARSE_TOLERANCE: f64 = 1e-4;
-/// The residual between two spreadings of the nodes: the next one disturbs the balance by more.
-const SPREAD_TOLERANCE: f64 = 1e-5;
-/// Spreading nodes and converging again, at most so often: each time the nodes move a tenth as far.
-const SPREADINGS: usize = 5;
-/// Nodes that move less than this part of the cell width need not be spread again.
-const EVEN_ENOUGH: f64 = 1e-6;
-
-/// Steps shorter than this part of Newton's leave uneven nodes behind, which stop later ones.
-const DAMPED: f64 = 0.9;
-
-/// Steps after the last T1 in which uneven nodes are spread after damped steps; what has not settled by then, spreading
-/// alone will not settle.
-const SPREAD_FOR: usize = 30;
-
-/// A film's end that has slid round a corner by this part of the cell width changes its plane at once; less may be the way
-/// of one step.
-const SLID: f64 = 0.02;
-/// How often films turn round corners before that no longer counts as progress.
-const MOST_TURNS: usize = 30;
-
-/// How often crumpled films are laid anew before a run counts as stalled.
-const MOST_LAID_ANEW: usize = 3;
-
-struct Run<'a> {
-    gap: &'a Gap,
-    settings: &'a RelaxSettings,
-    state: State,
-    descent: Descent,
-    residuals: Residuals,
-    unstable: usize,
-    laid_anew: usize,
-    turned: usize,
-    refined: bool,
-}
-
-/// Why Newton steps were halted.
-enum Halt {
-    Flip,
-    Turn,
-    Spread,
-    Interrupt,
-}
-
-impl<'a> Run<'a> {
-    fn new(state: State, gap: &'a Gap, settings: &'a RelaxSettings) -> Result<Self, RelaxError> {
-        let descent = state.descent(gap)?;
-        let residuals = Residuals { force: f64::INFINITY, volume: f64::INFINITY };
-        Ok(Self {
-            gap,
-            settings,
-            state,
-            descent,
-            residuals,
-            unstable: 0,
-            laid_anew: 0,
-            turned: 0,
-            refined: false,
-        })
-    }
-
-    fn ended(mut self, stop: Stop) -> Relaxed {
-        self.state.lay_rim(self.gap);
-        Relaxed { state: self.state, stop, residuals: self.residuals, unstable: self.unstable }
-    }
-
-    /// Newton steps with T1s until the residual is below `tolerance`; `None` then, otherwise why it stopped.
-    fn newton(
-        &mut self,
-        tolerance: f64,
-        progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
-    ) -> Result<Option<Stop>, RelaxError> {
-        let mut patience = self.state.steps + SPREAD_FOR;
-        loop {
-            let settings = DescentSettings {
-                length: self.state.cell_width(),
-                tolerance,
-                volume_tolerance: tolerance.max(self.settings.volume_tolerance),
-                step_limit: self.settings.step_limit.saturating_sub(self.state.steps),
-            };
-            let flip_below = self.settings.flip_below;
-            let Self { state, descent, .. } = self;
-            let mut lengths = topology::edge_lengths(state);
-            let mut halt = None;
-            let mut vanishing = Vec::new();
-            let descended = descent.descend(&settings, &mut |told| {
-                state.follow(told.descent);
-                let told = Progress {
-                    state,
-                    energy: told.descent.energy(),
-                    residuals: told.residuals,
-                    fraction: told.fraction,
-                    unstable: told.unstable,
-                };
-                if progress(&told).is_break() {
-                    halt = Some(Halt::Interrupt);
-                } else {
-                    let before = std::mem::replace(&mut lengths, topology::edge_lengths(state));
-                    vanishing = topology::vanishing_edges(state, &before, flip_below);
-                    halt = if !vanishing.is_empty() {
-                        Some(Halt::Flip)
-                    } else if topology::slid_round(state, SLID * settings.length).is_some() {
-                        Some(Halt::Turn)
-                    } else {
-                        (told.fraction < DAMPED && state.steps < patience).then_some(Halt::Spread)
-                    };
-                }
-                if halt.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            });
-            let steps = self.state.steps;
-            let Ok(descended) = descended else {
-                if self.lay_anew()? {
-                    continue;
-                }
-                return Ok(Some(Stop::Stalled { steps, residual: self.residuals.force }));
-            };
-            (self.residuals, self.unstable) = (descended.residuals, descended.unstable);
-            let residual = self.residuals.force;
-            match (descended.ending, halt) {
-                (Ending::Converged, _) if self.turn_corners()? => patience = steps + SPREAD_FOR,
-                (Ending::Converged, _) => return Ok(None),
-                (Ending::StepLimit, _) => return Ok(Some(Stop::StepLimit { residual })),
-                (Ending::Stalled, _) if self.lay_anew()? => patience = steps + SPREAD_FOR,
-                (Ending::Stalled, _) => return Ok(Some(Stop::Stalled { steps, residual })),
-                (Ending::Halted, Some(Halt::Flip)) => {
-                    self.flip(&vanishing)?;
-                    patience = steps + SPREAD_FOR;
-                }
-                (Ending::Halted, Some(Halt::Turn)) if self.turn_corners()? => patience = steps + SPREAD_FOR,
-                (Ending::Halted, Some(Halt::Turn)) => return Ok(Some(Stop::Stalled { steps, residual })),
-                (Ending::Halted, Some(Halt::Spread)) => {
-                    self.spread();
-                }
-                (Ending::Halted, _) => return Ok(Some(Stop::Interrupted { steps })),
-            }
-        }
-    }
-
-    /// Flips edges that do not touch each other, in order.
-    fn flip(&mut self, vanishing: &[EdgeId]) -> Result<(), RelaxError> {
-        let mut touched: BTreeSet<VertexId> = BTreeSet::new();
-        for &edge in vanishing {
-            let round = topology::round(&self.state.network, edge);
-            if round.iter().all(|vertex| !touched.contains(vertex)) {
-                topology::flip(&mut self.state, self.gap, edge);
-                touched.extend(round);
-            }
-        }
-        self.descent = self.state.descent(self.gap)?;
-        Ok(())
-    }
-
-    /// Lets films that have slid round a corner between two planes end on the other one. Gives whether there were any.
-    fn turn_corners(&mut self) -> Result<bool, RelaxError> {
-        let mut turned = false;
-        while self.turned < MOST_TURNS
-            && let Some((vertex, plane)) = topology::slid_round(&self.state, 0.0)
-        {
-            self.turned += 1;
-            turned |= topology::turn_corner(&mut self.state, self.gap, vertex, plane);
-        }
-        if turned {
-            self.descent = self.state.descent(self.gap)?;
-        }
-        Ok(turned)
-    }
-
-    /// Films that crumpled on the way from a rough start are laid anew between vertices that were drawn apart; who touches
-    /// whom stays. Gives whether that was done: only on the coarse mesh, and not often.
-    fn lay_anew(&mut self) -> Result<bool, RelaxError> {
-        if self.laid_anew == MOST_LAID_ANEW || self.refined {
-            return Ok(false);
-        }
-        self.laid_anew += 1;
-        let state = &mut self.state;
-        state.follow_films();
-        topology::draw_apart(&mut state.network, self.gap);
-        state.places = state.strips.first_places(&state.network, self.gap)?;
-        state.pressures.iter_mut().for_each(|pressure| *pressure = 0.0);
-        self.descent = state.descent(self.gap)?;
-        Ok(true)
-    }
-
-    /// Spreads the nodes evenly along the films. Gives the largest move.
-    fn spread(&mut self) -> f64 {
-        let mut places = self.state.places.clone();
-        let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
-        if self.descent.complex().retract(&mut places).is_ok() {
-            self.state.places.clone_from(&places);
-            self.descent.set_places(places);
-        }
-        moved
-    }
-
-    /// The final mesh: refined, spread evenly, converged.
-    fn finish(
-        &mut self,
-        progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
-    ) -> Result<Stop, RelaxError> {
-        self.refined = true;
-        let Strips { along, through } = self.settings.strips;
-        let strips = Strips { along: along.max(self.state.strips.along), through };
-        if self.state.strips != strips {
-            self.state.refine(strips);
-            self.descent = self.state.descent(self.gap)?;
-        }
-        let mut last = false;
-        for round in 1..=SPREADINGS {
-            let moved = self.spread();
-            last |= moved <= EVEN_ENOUGH * self.state.cell_width() || round == SPREADINGS;
-            if last {
-                self.descent.integrate_walls();
-            }
-            let tolerance = if last { self.settings.tolerance } else { SPREAD_TOLERANCE };
-            if let Some(stop) = self.newton(tolerance, progress)? {
-                return Ok(stop);
-            }
-            if last {
-                break;
-            }
-        }
-        self.state.follow_films();
-        Ok(Stop::Converged { steps: self.state.steps })
-    }
 }
 
 #[cfg(test)]

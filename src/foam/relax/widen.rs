@@ -8,7 +8,7 @@
 //! Beyond it, cells would touch other neighbours on one wall than on the other, and there is no foam of one layer of films
 //! from wall to wall with these cells. [`Pinch`] says where; the foam of the widest gap reached is kept.
 
-use super::{COARSE_TOLERANCE, Progress, RelaxError, RelaxSettings, Relaxed, Run, State, Stop, go_on, real};
+use super::{Progress, RelaxError, RelaxSettings, Relaxed, Run, State, Stop, go_on, real};
 use crate::{
     foam::{
         complex::{NodeId, NodeImage},
@@ -151,7 +151,7 @@ fn stage(
     let settings = RelaxSettings { step_limit, ..settings.clone() };
     let narrowed = gap.narrowed(state.part);
     let mut run = Run::new(state, &narrowed, &settings)?;
-    let stop = run.newton(COARSE_TOLERANCE, progress)?;
+    let stop = run.coarsely(progress)?;
     let steps = run.state.steps;
     Ok(run.ended(stop.unwrap_or(Stop::Converged { steps })))
 }
