@@ -142,6 +142,19 @@ fn hexagons_and_random_defects_are_found_different() -> Tried<()> {
 }
 
 #[test]
+fn intervals_of_rare_defects_stay_within_what_can_be() -> Tried<()> {
+    let found = compared(torus(14, 1, 1)?, torus(16, 1, 2)?)?;
+    for class in &found.sides.classes {
+        let ends: Vec<f64> = class.share.iter().filter_map(|share| share.interval).flatten().collect();
+        assert!(ends.iter().all(|end| (0.0..=1.0).contains(end)), "{class:?}");
+    }
+    for test in found.figures {
+        assert!(test.value.iter().filter_map(|value| value.interval).all(|[low, _]| low >= 0.0), "{test:?}");
+    }
+    Ok(())
+}
+
+#[test]
 fn too_few_cells_get_no_verdict() -> Tried<()> {
     let found = compared(torus(6, 3, 1)?, torus(14, 10, 2)?)?;
     assert_eq!(found.verdict.finding, Finding::TooFewCells);

@@ -129,7 +129,8 @@ impl Study<'_> {
     fn classes(&self, widening: &Widening) -> Vec<SideClass> {
         let occurs = |class: &usize| self.sums.iter().any(|sum| sum.by_sides[*class] > 0.0);
         let class = |sides: usize| {
-            let (share, difference) = self.estimates(widening.classes[sides], |tally| tally.share(sides));
+            let (share, difference) =
+                self.estimates(widening.classes[sides], [0.0, 1.0], |tally| tally.share(sides));
             SideClass { sides, cells: self.sums.map(|sum| whole(sum.by_sides[sides])), share, difference }
         };
         (0..CLASSES).filter(occurs).map(class).collect()
@@ -138,26 +139,35 @@ impl Study<'_> {
     fn figure_tests(&self, figures: &[Figure], p: &[f64], widening: &Widening) -> Vec<FigureTest> {
         let corrected = holm(p);
         let test = |(at, figure): (usize, &Figure)| {
-            let (value, difference) = self.estimates(widening.figures[at], |tally| figure.of(tally));
+            let (value, difference) =
+                self.estimates(widening.figures[at], figure.range(), |tally| figure.of(tally));
             FigureTest { figure: *figure, value, difference, p: p[at], p_holm: corrected[at] }
         };
         figures.iter().enumerate().map(test).collect()
     }
 
-    /// A figure in comb and foam, and its difference, with intervals that are widened by a factor.
-    fn estimates(&self, widening: f64, figure: impl Fn(&Tally) -> Option<f64>) -> ([Estimate; 2], Estimate) {
+    /// A figure in comb and foam, and its difference, with intervals that are widened by a factor within the figure's range.
+    fn estimates(
+        &self,
+        widening: f64,
+        [least, most]: [f64; 2],
+        figure: impl Fn(&Tally) -> Option<f64>,
+    ) -> ([Estimate; 2], Estimate) {
         let counts = [self.divided.comb.len(), self.divided.foam.len()];
         let value = self.sums.each_ref().map(|sum| figure(sum).unwrap_or(f64::NAN));
-        let estimate = |value: f64, resampled: Vec<f64>, units: usize| Estimate {
+        let estimate = |value: f64, resampled: Vec<f64>, units: usize, [least, most]: [f64; 2]| Estimate {
             value,
-            interval: interval(resampled, units).map(|ends| ends.map(|end| value + widening * (end - value))),
+            interval: interval(resampled, units)
+                .map(|ends| ends.map(|end| (value + widening * (end - value)).clamp(least, most))),
         };
         let one = |at: usize| {
-            estimate(value[at], self.resamples[at].iter().filter_map(&figure).collect(), counts[at])
+            let resampled = self.resamples[at].iter().filter_map(&figure).collect();
+            estimate(value[at], resampled, counts[at], [least, most])
         };
         let [comb, foam] = &self.resamples;
-        let differences = comb.iter().zip(foam).filter_map(|(a, b)| Some(figure(a)? - figure(b)?));
-        let difference = estimate(value[0] - value[1], differences.collect(), counts[0].min(counts[1]));
+        let differences = comb.iter().zip(foam).filter_map(|(a, b)| Some(figure(a)? - figure(b)?)).collect();
+        let fewer = counts[0].min(counts[1]);
+        let difference = estimate(value[0] - value[1], differences, fewer, [least - most, most - least]);
         ([one(0), one(1)], difference)
     }
 }

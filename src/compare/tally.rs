@@ -140,6 +140,16 @@ impl Figure {
         }
     }
 
+    /// The least and the greatest value that it can have.
+    pub(super) const fn range(self) -> [f64; 2] {
+        match self {
+            Self::DefectDensity | Self::PairDensity => [0.0, 1.0],
+            Self::MeanSides | Self::SecondMoment => [0.0, f64::INFINITY],
+            Self::ChainLength => [1.0, f64::INFINITY],
+            Self::ChargeOverCurvature => [f64::NEG_INFINITY, f64::INFINITY],
+        }
+    }
+
     /// By which factor its differences between shuffled units are widened for the links that units lose. A chain is never
     /// divided; of the charges over curvature no covariance is taken.
     pub(super) fn widening(self, links: &Links) -> f64 {
