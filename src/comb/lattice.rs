@@ -5,18 +5,29 @@
 //! inferred, so that growth crosses what hides the comb (caps, bees, glare) and reaches blobs beyond. Blobs that no
 //! lattice reaches (leaves, texture of wood) are dropped.
 
-use super::{grid::Grid, peaks::Peak, triangulation::Delaunay};
+use super::{
+    grid::Grid,
+    peaks::Peak,
+    plane::{Plane, narrow, pixel},
+    triangulation::{Delaunay, Edge},
+};
 use glam::DVec2;
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 
 /// Greatest deviation of a seed's six neighbour distances from their mean.
 const DISTANCE_SPREAD: f64 = 0.25;
 /// Least |ψ6| of a seed's neighbourhood: 1 for a perfect hexagon, about 0.4 for random points.
 const SEED_ORDER: f64 = 0.75;
+/// Neighbours are looked for within this many pitches.
+const NEIGHBOURHOOD: f64 = 1.8;
 /// A seed's mean neighbour distance lies within this factor of the pitch.
 const PITCH_FACTOR: f64 = 1.4;
 /// Points that are not worth sharing among threads.
 const POINTS_PER_TASK: usize = 256;
+/// Width over which the local pitch is a mean, in pitches, and the weight of the overall pitch, in cells.
+const FIELD_SPREAD: f64 = 2.0;
+const FIELD_PRIOR: f64 = 0.2;
 /// Edges of a good triangle, in pitches.
 const GOOD_EDGE: (f64, f64) = (0.55, 1.55);
 /// A blob this near to its predicted place (in pitches) is the predicted cell.
@@ -25,6 +36,9 @@ const SNAP: f64 = 0.38;
 const CLOSEST: f64 = 0.58;
 /// Cells this near to an inferred one (in pitches) settle which are its neighbours: twice the longest good edge.
 const AROUND: f64 = 2.0 * GOOD_EDGE.1;
+/// How often inferred cells are triangulated to be moved, and moved each time.
+const TRIANGULATIONS: usize = 2;
+const MOVES: usize = 5;
 /// Layers of inferred cells that may follow one another: half the width of the widest cap that is bridged.
 const INFERRED_LAYERS: usize = 7;
 
@@ -42,20 +56,25 @@ pub(crate) fn hexagonal_neighbourhoods(points: &[DVec2], pitch: f64) -> Vec<Opti
         .par_iter()
         .with_min_len(POINTS_PER_TASK)
         .map(|point| {
-            let mut near: Vec<(usize, f64)> =
-                grid.within(*point, 1.8 * pitch).filter(|(_, squared)| *squared > 0.0).collect();
-            near.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-            near.truncate(6);
-            let steps: Vec<DVec2> = near.iter().map(|(index, _)| points[*index] - *point).collect();
-            hexagonal(&steps, pitch)
+            // The six nearest, in order.
+            let mut near = [(f64::INFINITY, usize::MAX); 6];
+            for (index, squared) in grid.within(*point, NEIGHBOURHOOD * pitch) {
+                let mut here = (squared, index);
+                for place in near.iter_mut().filter(|_| squared > 0.0) {
+                    if here < *place {
+                        std::mem::swap(&mut here, place);
+                    }
+                }
+            }
+            let found = near.iter().all(|(squared, _)| squared.is_finite());
+            found
+                .then(|| near.map(|(_, index)| points[index] - *point))
+                .and_then(|steps| hexagonal(&steps, pitch))
         })
         .collect()
 }
 
-fn hexagonal(steps: &[DVec2], pitch: f64) -> Option<Neighbourhood> {
-    if steps.len() < 6 {
-        return None;
-    }
+fn hexagonal(steps: &[DVec2; 6], pitch: f64) -> Option<Neighbourhood> {
     let distance = steps.iter().map(|s| s.length()).sum::<f64>() / 6.0;
     let sixfold: DVec2 = steps.iter().map(|s| sixth_power(s.normalize_or_zero())).sum();
     let even = steps.iter().all(|s| (s.length() / distance - 1.0).abs() < DISTANCE_SPREAD);
@@ -84,25 +103,23 @@ impl PitchField {
         let bin = overall;
         let cells = |length: f64| super::plane::pixels((length / bin).ceil()).max(1);
         let (columns, rows) = (cells(size.x), cells(size.y));
-        let mut sums = vec![(0.0, 0.0); columns * rows];
-        let spread = 2.0 * overall;
+        let mut sums = vec![[0.0; 2]; columns * rows];
         for (point, distance) in measured {
-            let at = |value: f64, count: usize| super::plane::pixel(value, count);
-            let span = |v: f64, count: usize| {
-                at((v - 3.0 * spread) / bin, count)..=at((v + 3.0 * spread) / bin, count)
-            };
-            for row in span(point.y, rows) {
-                for column in span(point.x, columns) {
-                    let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5) * bin;
-                    let weight = (-0.5 * centre.distance_squared(*point) / (spread * spread)).exp();
-                    let (w, d) = &mut sums[row * columns + column];
-                    *w += weight;
-                    *d += weight * distance;
-                }
-            }
+            let [column, row] = [(point.x, columns), (point.y, rows)].map(|(v, count)| pixel(v / bin, count));
+            let [count, sum] = &mut sums[row * columns + column];
+            *count += 1.0;
+            *sum += distance;
         }
-        let prior = 0.2;
-        let pitches = sums.iter().map(|(w, d)| (d + prior * overall) / (w + prior)).collect();
+        let mean = |part: usize| {
+            Plane::from_fn(columns, rows, |x, y| narrow(sums[y * columns + x][part])).blurred(FIELD_SPREAD)
+        };
+        let (counts, distances) = (mean(0), mean(1));
+        let around = TAU * FIELD_SPREAD * FIELD_SPREAD;
+        let pitch = |(count, distance): (&f32, &f32)| {
+            (around * f64::from(*distance) + FIELD_PRIOR * overall)
+                / (around * f64::from(*count) + FIELD_PRIOR)
+        };
+        let pitches = counts.data().iter().zip(distances.data()).map(pitch).collect();
         Self { bin, columns, rows, pitches }
     }
 
@@ -115,8 +132,8 @@ impl PitchField {
 
     /// The pitch at a point.
     pub(crate) fn at(&self, point: DVec2) -> f64 {
-        let column = super::plane::pixel(point.x / self.bin, self.columns);
-        let row = super::plane::pixel(point.y / self.bin, self.rows);
+        let column = pixel(point.x / self.bin, self.columns);
+        let row = pixel(point.y / self.bin, self.rows);
         self.pitches[row * self.columns + column]
     }
 }
@@ -196,6 +213,8 @@ struct Growth<'a> {
 struct Prediction {
     position: DVec2,
     depth: usize,
+    /// The edge's ends.
+    edge: (usize, usize),
 }
 
 impl<'a> Growth<'a> {
@@ -230,20 +249,24 @@ impl<'a> Growth<'a> {
     }
 
     fn predictions(&self) -> Vec<Prediction> {
-        let mut found = Vec::new();
-        for edge in self.triangles.edges() {
-            let (a, b) = edge.ends;
-            let mut good = edge.across().filter(|c| self.is_good(a, b, *c));
-            if let (Some(third), None) = (good.next(), good.next()) {
-                let [a, b] = [a, b].map(|end| self.sites[end]);
-                let position = a.position + b.position - self.sites[third].position;
-                let depth = a.depth.max(b.depth);
-                if self.is_free(position) {
-                    found.push(Prediction { position, depth });
-                }
-            }
-        }
+        let edges = self.triangles.unsorted_edges();
+        let mut found: Vec<Prediction> = edges.filter_map(|edge| self.prediction(&edge)).collect();
+        // What was found first has the first word.
+        found.sort_unstable_by_key(|prediction| prediction.edge);
         found
+    }
+
+    fn prediction(&self, edge: &Edge) -> Option<Prediction> {
+        let (a, b) = edge.ends;
+        let mut good = edge.across().filter(|c| self.is_good(a, b, *c));
+        let (Some(third), None) = (good.next(), good.next()) else { return None };
+        let [a, b] = [a, b].map(|end| self.sites[end]);
+        let position = a.position + b.position - self.sites[third].position;
+        self.is_free(position).then_some(Prediction {
+            position,
+            depth: a.depth.max(b.depth),
+            edge: edge.ends,
+        })
     }
 
     fn is_good(&self, a: usize, b: usize, c: usize) -> bool {
@@ -312,17 +335,25 @@ impl<'a> Growth<'a> {
     /// Moves inferred cells towards the mean of their neighbours, so that lattices that grew from two sides meet evenly.
     fn relax(&mut self) {
         let around = self.around_inferred();
-        for _ in 0..10 {
+        for _ in 0..TRIANGULATIONS {
             let points: Vec<DVec2> = around.iter().map(|site| self.sites[*site].position).collect();
             let neighbours = Delaunay::of(&points).neighbours();
-            for ((site, point), near) in around.iter().zip(&points).zip(&neighbours) {
-                let site = &mut self.sites[*site];
-                let reach = GOOD_EDGE.1 * self.pitch.at(*point);
-                let near: Vec<DVec2> =
-                    near.iter().map(|n| points[*n]).filter(|p| p.distance(*point) < reach).collect();
-                let enclosed = near.len() >= 5;
-                if site.depth > 0 && enclosed {
-                    site.position = near.iter().sum::<DVec2>() / near.len() as f64;
+            let inferred: Vec<usize> =
+                (0..around.len()).filter(|place| self.sites[around[*place]].depth > 0).collect();
+            for _ in 0..MOVES {
+                let at = |place: usize| self.sites[around[place]].position;
+                let moved: Vec<Option<DVec2>> = inferred
+                    .iter()
+                    .map(|place| {
+                        let reach = GOOD_EDGE.1 * self.pitch.at(at(*place));
+                        let near = neighbours[*place].iter().map(|n| at(*n));
+                        let near: Vec<DVec2> = near.filter(|p| p.distance(at(*place)) < reach).collect();
+                        (near.len() >= 5).then(|| near.iter().sum::<DVec2>() / near.len() as f64)
+                    })
+                    .collect();
+                for (place, position) in inferred.iter().zip(moved) {
+                    let site = &mut self.sites[around[*place]];
+                    site.position = position.unwrap_or(site.position);
                 }
             }
         }

@@ -1,6 +1,9 @@
 //! Blobs of about one cell's size: a band-pass at the pitch, and its local maxima.
 
-use super::plane::Plane;
+use super::{
+    plane::{Plane, narrow},
+    smooth::Smooth,
+};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -25,11 +28,14 @@ pub(crate) struct Peak {
 /// Response to bright blobs of one cell's size, divided by its own root mean square around.
 #[must_use]
 pub(crate) fn band_pass(grey: &Plane, pitch: f64) -> Plane {
-    let response = difference(grey, pitch);
-    let power = response.map(|v| v * v).blurred(REACH * pitch);
-    #[expect(clippy::cast_possible_truncation, reason = "a constant")]
-    let floor = (NOISE_FLOOR * NOISE_FLOOR) as f32;
-    response.zip(&power, |v, p| v / (p + floor).sqrt())
+    let mut response = difference(grey, pitch);
+    let square = |y: usize, row: &mut [f32]| {
+        row.iter_mut().zip(response.row(y)).for_each(|(v, s)| *v = s * s);
+    };
+    let power = Smooth::mean(grey.width(), grey.height(), REACH * pitch, square);
+    let floor = narrow(NOISE_FLOOR * NOISE_FLOOR);
+    response.fill_rows(|y, row| power.with_row(y, row, |v, power| v / (power + floor).sqrt()));
+    response
 }
 
 /// Difference of two Gaussian means: bright blobs of one cell's size.

@@ -15,6 +15,7 @@ use super::{
     triangulation::Delaunay,
 };
 use glam::DVec2;
+use rayon::prelude::*;
 
 /// Pixels per pitch at which blobs are looked for, as nearly as whole blocks of working pixels allow.
 const SURVEY_PITCH: f64 = 15.0;
@@ -55,12 +56,13 @@ pub(crate) fn survey(pyramid: &Pyramid<'_>, polarity: Polarity, scale: f64, pitc
     let extent = DVec2::new(relief.width() as f64, relief.height() as f64);
     let (sites, field) = blobs.sites(&small, extent / block as f64, Layers::Inferred);
     let unit = block as f64;
-    Survey {
-        wallness,
-        relief,
-        sites: sites.into_iter().map(|s| Site { position: s.position * unit, ..s }).collect(),
-        field: field.scaled(unit),
-    }
+    let mut sites: Vec<Site> = sites.into_iter().map(|s| Site { position: s.position * unit, ..s }).collect();
+    // As one reads: what lies together is then looked at together.
+    sites.sort_by(|a, b| {
+        let row = |site: &Site| (site.position.y / pitch).floor();
+        row(a).total_cmp(&row(b)).then(a.position.x.total_cmp(&b.position.x))
+    });
+    Survey { wallness, relief, sites, field: field.scaled(unit) }
 }
 
 /// What finds blobs in a small raster, whichever measure of wall that shows.
@@ -90,7 +92,7 @@ impl Blobs {
         let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
         let regular = hexagonal_neighbourhoods(&points, pitch);
         let measured: Vec<(DVec2, f64)> =
-            regular.iter().zip(&points).filter_map(|(n, p)| n.map(|n| (*p, n.distance))).collect();
+            regular.iter().zip(&found).filter_map(|(n, p)| n.map(|n| (p.position, n.distance))).collect();
         let field = PitchField::new(extent, pitch, &measured);
         let is_seed = |p: &Peak| p.strength > SEED_STRENGTH;
         let seeds: Vec<bool> = regular.iter().zip(&found).map(|(n, p)| n.is_some() && is_seed(p)).collect();
@@ -121,8 +123,7 @@ impl Blobs {
                 .max_by(|p, q| height(p).total_cmp(&height(q)))
         };
         let walls: Vec<DVec2> = Delaunay::of(&seen)
-            .edges()
-            .iter()
+            .unsorted_edges()
             .map(|edge| (seen[edge.ends.0], seen[edge.ends.1]))
             .filter(|(a, b)| a.distance(*b) < 1.3 * self.pitch)
             .filter_map(|(a, b)| crest(a, b))
