@@ -32,6 +32,8 @@ pub(crate) struct Evidence {
     pub(crate) openness: f64,
     /// Standard deviation of the distances to the rim over their mean: about 0.06 for a hexagonal opening.
     pub(crate) unevenness: f64,
+    /// The same of the distances to the region's edge.
+    pub(crate) raggedness: f64,
 }
 
 /// The rasters that the rays look at.
@@ -88,8 +90,6 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
     }
     let rays = (rims.len() as f64).max(1.0);
     let (closed, rise, contrast) = (closed / rays, rise / rays, contrast / rays);
-    let mean = rims.iter().sum::<f64>() / rays;
-    let variance = rims.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / rays;
     Evidence {
         radii,
         visible: rims.len() as f64 / RAYS as f64,
@@ -98,8 +98,17 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
         rise,
         contrast,
         openness: openness(rasters.relief, centre, pitch, inside + 0.5 * rise),
-        unevenness: variance.sqrt() / mean.max(1e-9),
+        unevenness: spread(&rims),
+        raggedness: spread(&radii),
     }
+}
+
+/// Standard deviation over mean.
+fn spread(lengths: &[f64]) -> f64 {
+    let count = (lengths.len() as f64).max(1.0);
+    let mean = lengths.iter().sum::<f64>() / count;
+    let variance = lengths.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / count;
+    variance.sqrt() / mean.max(1e-9)
 }
 
 /// Mean over the middle of the cell.

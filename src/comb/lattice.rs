@@ -2,8 +2,8 @@
 //!
 //! Seeds are blobs in a regular hexagonal neighbourhood. From them the lattice grows: every open edge of a good triangle
 //! predicts the cell beyond it, by reflection. A blob near that place is taken as seen; where there is none, the cell is
-//! inferred, so that growth crosses what hides the comb (caps, bees, glare) and reaches blobs beyond. Blobs that no
-//! lattice reaches (leaves, texture of wood) are dropped.
+//! inferred, so that growth crosses what hides the comb (caps, bees, glare) and reaches blobs beyond. Clear blobs amid the
+//! comb, as open cells among caps are, need no prediction. Blobs that no lattice reaches (leaves, texture of wood) are dropped.
 
 use super::{
     grid::Grid,
@@ -34,6 +34,8 @@ const GOOD_EDGE: (f64, f64) = (0.55, 1.55);
 const SNAP: f64 = 0.38;
 /// Two cells are never nearer than this (in pitches).
 const CLOSEST: f64 = 0.58;
+/// A clear blob is a cell if places of the lattice lie within this many pitches in five of six directions.
+const AMID_REACH: f64 = 7.0;
 /// Cells this near to an inferred one (in pitches) settle which are its neighbours: twice the longest good edge.
 const AROUND: f64 = 2.0 * GOOD_EDGE.1;
 /// How often inferred cells are triangulated to be moved, and moved each time.
@@ -145,6 +147,8 @@ pub(crate) struct Site {
     pub(crate) position: DVec2,
     /// 0 where a blob was seen, else how many inferred layers lie between this place and a seen one.
     pub(crate) depth: usize,
+    /// Whether the blob stands out as an open cell among caps does.
+    pub(crate) clear: bool,
     /// Whether a person says that there is a cell.
     pub(crate) by_hand: bool,
     /// Whether a person says that there is none: its pixels are then taken from all cells.
@@ -153,12 +157,12 @@ pub(crate) struct Site {
 
 impl Site {
     const fn new(position: DVec2, depth: usize) -> Self {
-        Self { position, depth, by_hand: false, removed: false }
+        Self { position, depth, clear: false, by_hand: false, removed: false }
     }
 
     /// A cell that a person has added.
     pub(crate) const fn by_hand(position: DVec2) -> Self {
-        Self { position, depth: 0, by_hand: true, removed: false }
+        Self { position, depth: 0, clear: false, by_hand: true, removed: false }
     }
 
     /// Whether a blob was seen here, and no person says otherwise.
@@ -177,6 +181,7 @@ pub(crate) fn grow(
 ) -> Vec<Site> {
     let mut growth = Growth::new(peaks, pitch, seeds, size);
     while growth.accept_seen() {}
+    while growth.accept_clear() {}
     if layers == Layers::Inferred {
         for layer in 1..=INFERRED_LAYERS {
             if !growth.infer_layer(layer) {
@@ -239,7 +244,8 @@ impl<'a> Growth<'a> {
 
     fn take(&mut self, peak: usize) {
         self.taken[peak] = true;
-        self.add(Site::new(self.peaks[peak].position, 0));
+        let Peak { position, clear, .. } = self.peaks[peak];
+        self.add(Site { clear, ..Site::new(position, 0) });
     }
 
     fn add(&mut self, site: Site) {
@@ -298,6 +304,31 @@ impl<'a> Growth<'a> {
             }
         }
         self.sites.len() > before
+    }
+
+    /// Takes every clear blob amid the comb, wherever the lattice would have it; whether there was any. Among caps the lattice
+    /// cannot be followed from one open cell to the next, and what it predicts would keep the cells themselves out.
+    fn accept_clear(&mut self) -> bool {
+        let before = self.sites.len();
+        for (index, peak) in self.peaks.iter().enumerate() {
+            let is_new = peak.clear && !self.taken[index] && self.is_free(peak.position);
+            if is_new && self.is_amid(peak.position) {
+                self.take(index);
+            }
+        }
+        while self.accept_seen() {}
+        self.sites.len() > before
+    }
+
+    /// Whether places of the lattice lie near in all directions but one, so that no frame, leaf or sky is meant.
+    fn is_amid(&self, position: DVec2) -> bool {
+        let reach = AMID_REACH * self.pitch.at(position);
+        let mut held = [false; 6];
+        for (other, _) in self.site_grid.within(position, reach) {
+            let angle = (self.sites[other].position - position).to_angle().rem_euclid(TAU);
+            held[pixel(angle / TAU * 6.0, 6)] = true;
+        }
+        held.iter().filter(|held| **held).count() >= 5
     }
 
     /// Adds a layer of inferred cells around all sites; whether there was any to add.
@@ -367,5 +398,41 @@ impl<'a> Growth<'a> {
             self.site_grid.within(site.position, reach).for_each(|(other, _)| near[other] = true);
         }
         (0..near.len()).filter(|site| near[*site]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A lattice with a hole, in which and beyond which a blob lies where no cell of the lattice would be.
+    #[test]
+    fn a_clear_blob_amid_the_comb_is_a_cell_wherever_it_lies() {
+        let pitch = 10.0;
+        let place = |column: usize, row: usize| {
+            let shift = if row % 2 == 0 { 0.0 } else { 0.5 };
+            DVec2::new(column as f64 + shift, row as f64 * 0.75_f64.sqrt()) * pitch + 40.0
+        };
+        let all = || (0..15).flat_map(|row| (0..15).map(move |column| (column, row)));
+        let middle = place(7, 7);
+        let lattice = all().map(|(column, row)| place(column, row));
+        let open: Vec<DVec2> = lattice.filter(|p| p.distance(middle) > 2.2 * pitch).collect();
+        // Half a pitch off the lattice: farther than a prediction reaches.
+        let amid = middle + DVec2::new(0.5, 0.3) * pitch;
+        let beyond = place(17, 7) + DVec2::new(0.0, 5.0);
+        for clear in [true, false] {
+            let peak = |position: DVec2, clear| Peak { position, strength: 1.0, clear };
+            let mut peaks: Vec<Peak> = open.iter().map(|p| peak(*p, false)).collect();
+            peaks.extend([amid, beyond].map(|p| peak(p, clear)));
+            let points: Vec<DVec2> = peaks.iter().map(|p| p.position).collect();
+            let seeds: Vec<bool> =
+                hexagonal_neighbourhoods(&points, pitch).iter().map(Option::is_some).collect();
+            let size = DVec2::new(260.0, 220.0);
+            let sites = grow(&peaks, &PitchField::new(size, pitch, &[]), &seeds, size, Layers::Inferred);
+            let is_seen = |at: DVec2| sites.iter().any(|s| s.is_seen() && s.position.distance(at) < 1e-9);
+            assert_eq!(is_seen(amid), clear);
+            assert!(!is_seen(beyond));
+            assert!(open.iter().all(|p| is_seen(*p)));
+        }
     }
 }

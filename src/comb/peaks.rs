@@ -23,6 +23,8 @@ pub(crate) struct Peak {
     pub(crate) position: DVec2,
     /// Height: about 1 for a typical cell of its surroundings.
     pub(crate) strength: f64,
+    /// Whether it stands out as an open cell among caps does.
+    pub(crate) clear: bool,
 }
 
 /// Response to bright blobs of one cell's size, divided by its own root mean square around.
@@ -51,7 +53,11 @@ pub(crate) fn maxima(response: &Plane, threshold: f32) -> Vec<Peak> {
         let row = response.row(y).iter().enumerate().filter(|(_, value)| **value >= threshold);
         let greatest = row.filter(|(x, _)| is_greatest(response, *x, y));
         greatest
-            .map(|(x, value)| Peak { position: refined(response, x, y), strength: f64::from(*value) })
+            .map(|(x, value)| Peak {
+                position: refined(response, x, y),
+                strength: f64::from(*value),
+                clear: false,
+            })
             .collect::<Vec<Peak>>()
     };
     (0..response.height()).into_par_iter().with_min_len(32).flat_map_iter(in_row).collect()

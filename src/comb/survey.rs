@@ -23,6 +23,9 @@ const SURVEY_PITCH: f64 = 15.0;
 const DARKEST: f32 = 0.02;
 /// Least contrast of a blob as a share of the regular ones' median.
 const LEAST_RATIO: f64 = 0.3;
+/// The same and the least strength of a blob that is a cell wherever it lies.
+const CLEAR_RATIO: f64 = 0.8;
+const CLEAR_STRENGTH: f64 = 1.6;
 /// Least strength of a blob, and of one that a lattice may grow from.
 const LEAST_STRENGTH: f32 = 0.15;
 const SEED_STRENGTH: f64 = 0.4;
@@ -88,7 +91,7 @@ impl Blobs {
         let pitch = self.pitch;
         let response = peaks::band_pass(&relief.map(|v| -v), pitch);
         let maxima = peaks::maxima(&response, LEAST_STRENGTH);
-        let found = self.clear(peaks::thinned(maxima, |_| 0.5 * pitch, pitch));
+        let found = self.judged(peaks::thinned(maxima, |_| 0.5 * pitch, pitch));
         let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
         let regular = hexagonal_neighbourhoods(&points, pitch);
         let measured: Vec<(DVec2, f64)> =
@@ -100,14 +103,16 @@ impl Blobs {
     }
 
     /// Drops blobs whose contrast, as a ratio of brightness, is far below that of the regular ones: levelling the light
-    /// also levels up the texture of caps and of the ground.
-    fn clear(&self, found: Vec<Peak>) -> Vec<Peak> {
+    /// also levels up the texture of caps and of the ground. Those of at least the contrast of regular ones are clear.
+    fn judged(&self, found: Vec<Peak>) -> Vec<Peak> {
         let contrast = |p: &Peak| f64::from(self.ratio.sample(p.position.x, p.position.y));
         let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
         let regular = hexagonal_neighbourhoods(&points, self.pitch);
         let typical =
             median(found.iter().zip(&regular).filter(|(_, n)| n.is_some()).map(|(p, _)| contrast(p)));
-        found.into_iter().filter(|p| contrast(p) > LEAST_RATIO * typical).collect()
+        let is_clear = |p: &Peak| p.strength > CLEAR_STRENGTH && contrast(p) > CLEAR_RATIO * typical;
+        let kept = found.into_iter().filter(|p| contrast(p) > LEAST_RATIO * typical);
+        kept.map(|p| Peak { clear: is_clear(&p), ..p }).collect()
     }
 
     /// The wall colour, from the highest points between neighbouring cells against the cells' middles; `raster` has
