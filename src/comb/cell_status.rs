@@ -2,7 +2,7 @@
 
 use super::{
     evidence::Evidence,
-    kinds::{Kind, median},
+    kinds::{Kind, UNEVENNESS, median},
     read::Reading,
 };
 use crate::tessellation::CellStatus;
@@ -14,9 +14,15 @@ const LEAST_CONFIDENCE: f64 = 0.6;
 const LEAST_CLOSURE: f64 = 0.85;
 /// Least rise to the wall, as a share of the photograph's median: textures of caps rise by half of it.
 const LEAST_RISE: f64 = 0.5;
+/// Greatest raggedness of an outline that was seen from wall to wall.
+const GREATEST_RAGGEDNESS: f64 = 0.22;
+/// Area of a cell of fewer than six sides, and of more, over that of a hexagon of the local pitch: 0.73 to 0.96 and 1.12 to
+/// 1.47 in the photographs with hand-checked truth, 0.80 to 1.00 and 1.02 to 1.18 (two in a hundred beyond) in synthetic ones.
+const GREATEST_PENTAGON: f64 = 1.05;
+const LEAST_HEPTAGON: f64 = 0.98;
 /// Chance that a side is right whose neighbour is hidden, and whose neighbour lies beyond the photograph, from synthetic
 /// photographs (analysis/comb_accuracy/calibration.csv).
-const HIDDEN_SIDE: f64 = 0.87;
+const HIDDEN_SIDE: f64 = 0.78;
 const SIDE_BEYOND: f64 = 0.985;
 /// Hidden neighbours that a complete cell may have: with two, a wall between them may end anywhere.
 const HIDDEN_NEIGHBOURS: usize = 1;
@@ -50,13 +56,17 @@ fn standing(reading: &Reading, cell: usize, typical_rise: f64) -> Standing {
     let doubt = HIDDEN_SIDE.powi(saturating(hidden)) * SIDE_BEYOND.powi(saturating(beyond.len()));
     let confidence = (reading.counts[cell].confidence * doubt * evidence.closure).min(GREATEST_CONFIDENCE);
     // The place of a neighbour of which little is seen was inferred as if there were no defect: it cannot prove one.
-    let slivers = of_kind(Kind::Seen).filter(|n| reading.slivers[**n]).count();
-    let (odd, unseen) = (neighbours.len() != 6, hidden + beyond.len() + slivers);
+    let is_vague = |n: &usize| reading.slivers[*n] || !reading.cut[*n] && !is_shaped(&reading.evidence[*n]);
+    let vague = of_kind(Kind::Seen).filter(|n| is_vague(n)).count();
+    let (odd, unseen) = (neighbours.len() != 6, hidden + beyond.len() + vague);
     let status = if reading.kinds[cell] != Kind::Seen {
         CellStatus::Uncertain
     } else if reading.cut[cell] || !at_edge.is_empty() || hidden > HIDDEN_NEIGHBOURS {
         CellStatus::Cut
-    } else if confidence < LEAST_CONFIDENCE || !is_plain(evidence, typical_rise) || (odd && unseen > 0) {
+    } else if confidence < LEAST_CONFIDENCE
+        || !is_plain(evidence, typical_rise)
+        || (odd && (unseen > 0 || !is_sized(reading, cell)))
+    {
         CellStatus::Uncertain
     } else {
         CellStatus::Complete
@@ -65,7 +75,19 @@ fn standing(reading: &Reading, cell: usize, typical_rise: f64) -> Standing {
 }
 
 fn is_plain(evidence: &Evidence, typical_rise: f64) -> bool {
-    evidence.closure >= LEAST_CLOSURE && evidence.rise >= LEAST_RISE * typical_rise
+    evidence.closure >= LEAST_CLOSURE && evidence.rise >= LEAST_RISE * typical_rise && is_shaped(evidence)
+}
+
+fn is_shaped(evidence: &Evidence) -> bool {
+    evidence.unevenness <= UNEVENNESS && evidence.raggedness <= GREATEST_RAGGEDNESS
+}
+
+/// Whether a cell has the size that goes with its number of sides: those of fewer than six are smaller than hexagons, those
+/// of more are larger. One that is not has got the pixels of a neighbour that was missed.
+fn is_sized(reading: &Reading, cell: usize) -> bool {
+    let hexagon = reading.pitches[cell].powi(2) * 0.75_f64.sqrt();
+    let area = reading.regions[cell].area / hexagon;
+    if reading.counts[cell].neighbours.len() < 6 { area < GREATEST_PENTAGON } else { area > LEAST_HEPTAGON }
 }
 
 /// Whether a place beyond the comb lies within the photograph, so that a cell there would have been seen.

@@ -11,6 +11,7 @@ use crate::{
     tessellation::{Cell, CellId, CellPattern, CellStatus, CellWall, PatternDefect, Surroundings},
 };
 use glam::{DVec2, DVec3, IVec3};
+use rayon::prelude::*;
 
 /// What a photograph tells of a cell beyond the pattern.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +39,10 @@ pub(crate) fn assemble(
         ids[*index] = Some(CellId::from_index(position));
     }
     let place = |at: DVec2| at / reading.scale + origin;
-    let cells = listed.iter().map(|i| cell(reading, *i, standings[*i], &ids, place)).collect();
-    let details = listed.iter().map(|i| detail(reading, *i, place)).collect();
+    let cells: Vec<Cell> = listed.par_iter().map(|i| cell(reading, *i, standings[*i], &ids, place)).collect();
+    let cells = cells.into_iter().collect();
+    let details: Vec<CellDetail> = listed.par_iter().map(|i| detail(reading, *i, place)).collect();
+    let details = details.into_iter().collect();
     Ok((CellPattern::new("px", Surroundings::Open, cells)?, details))
 }
 

@@ -26,12 +26,14 @@ pub(crate) struct Evidence {
     pub(crate) closure: f64,
     /// Mean rise of the levelled relief from the inside to the wall.
     pub(crate) rise: f64,
-    /// The same of the wall colour before the light was levelled.
+    /// The same of the wall colour before the light was levelled, where the relief is highest.
     pub(crate) contrast: f64,
     /// Share of the middle that is clearly lower than the wall.
     pub(crate) openness: f64,
     /// Standard deviation of the distances to the rim over their mean: about 0.06 for a hexagonal opening.
     pub(crate) unevenness: f64,
+    /// The same of the distances to the region's edge.
+    pub(crate) raggedness: f64,
 }
 
 /// The rasters that the rays look at.
@@ -71,9 +73,9 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
     for (ray, reached) in radii.iter_mut().enumerate() {
         let step = direction(ray);
         let radius = reach(rasters.segmentation, cell, centre, step, pitch);
-        let highest = |plane: &Plane| highest(plane, centre, step, radius - window, radius + window);
         *reached = radius;
-        let height = highest(rasters.relief) - inside;
+        let (height, crest) = highest(rasters.relief, centre, step, [radius - window, radius + window]);
+        let height = height - inside;
         if !rasters.segmentation.holds(centre + step * (radius + 1.0)) {
             at_border += f64::from(u8::from(rises_to(rasters.relief, centre, step, radius, pitch)));
             if height < WALL_RISE {
@@ -81,14 +83,13 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
             }
         }
         rise += height;
-        contrast += highest(rasters.wallness) - middle_raw;
+        let crest = centre + step * crest;
+        contrast += f64::from(rasters.wallness.sample(crest.x, crest.y)) - middle_raw;
         closed += f64::from(u8::from(height > WALL_RISE));
         rims.push(rim(rasters.relief, centre, step, radius, inside + 0.5 * height));
     }
     let rays = (rims.len() as f64).max(1.0);
     let (closed, rise, contrast) = (closed / rays, rise / rays, contrast / rays);
-    let mean = rims.iter().sum::<f64>() / rays;
-    let variance = rims.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / rays;
     Evidence {
         radii,
         visible: rims.len() as f64 / RAYS as f64,
@@ -97,8 +98,17 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
         rise,
         contrast,
         openness: openness(rasters.relief, centre, pitch, inside + 0.5 * rise),
-        unevenness: variance.sqrt() / mean.max(1e-9),
+        unevenness: spread(&rims),
+        raggedness: spread(&radii),
     }
+}
+
+/// Standard deviation over mean.
+fn spread(lengths: &[f64]) -> f64 {
+    let count = (lengths.len() as f64).max(1.0);
+    let mean = lengths.iter().sum::<f64>() / count;
+    let variance = lengths.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / count;
+    variance.sqrt() / mean.max(1e-9)
 }
 
 /// Mean over the middle of the cell.
@@ -129,12 +139,16 @@ fn reach(segmentation: &Segmentation, cell: usize, centre: DVec2, step: DVec2, p
     radius
 }
 
-fn highest(plane: &Plane, centre: DVec2, step: DVec2, from: f64, to: f64) -> f64 {
-    let mut best = f64::NEG_INFINITY;
+/// The greatest value between two distances along a ray, and its distance.
+fn highest(plane: &Plane, centre: DVec2, step: DVec2, [from, to]: [f64; 2]) -> (f64, f64) {
+    let mut best = (f64::NEG_INFINITY, from);
     let mut radius = from.max(0.0);
     while radius <= to {
         let place = centre + step * radius;
-        best = best.max(f64::from(plane.sample(place.x, place.y)));
+        let value = f64::from(plane.sample(place.x, place.y));
+        if value > best.0 {
+            best = (value, radius);
+        }
         radius += 0.75;
     }
     best
@@ -143,7 +157,7 @@ fn highest(plane: &Plane, centre: DVec2, step: DVec2, from: f64, to: f64) -> f64
 /// Whether the relief is highest, in the outer half of a ray, within the last pixels.
 fn rises_to(plane: &Plane, centre: DVec2, step: DVec2, radius: f64, pitch: f64) -> bool {
     let end = radius - LAST_PIXELS;
-    highest(plane, centre, step, end, radius) > highest(plane, centre, step, 0.25 * pitch, end)
+    highest(plane, centre, step, [end, radius]).0 > highest(plane, centre, step, [0.25 * pitch, end]).0
 }
 
 /// Where the relief last rises above `level` on the way out: the rim of the opening.

@@ -21,7 +21,9 @@ const RISE: f64 = 0.6;
 /// the shade is above.
 const CONTRAST: f64 = 0.08;
 /// Greatest relative unevenness of the rim.
-const UNEVENNESS: f64 = 0.3;
+pub(crate) const UNEVENNESS: f64 = 0.3;
+/// Greatest raggedness of a whole cell; complete cells of the photographs with hand-checked truth have up to 0.2.
+const RAGGEDNESS: f64 = 0.27;
 /// Cells that must hang together for a piece of comb.
 const PIECE: usize = 7;
 /// Open cells within this many pitches hang together.
@@ -40,15 +42,23 @@ pub(crate) enum Kind {
     Outside,
 }
 
-/// Decides what each place is; `whole` are the cells that neither the border nor a mask cuts.
+/// Decides what each place is; `whole` are the cells that neither the border nor a mask cuts, `clear` those whose blob stands
+/// out as an open cell among caps does.
 pub(crate) fn classify(
     centres: &[DVec2],
     pitches: &[f64],
     evidence: &[Evidence],
     whole: &[bool],
+    clear: &[bool],
 ) -> Vec<Kind> {
     let typical = median(evidence.iter().zip(whole).filter(|(_, w)| **w).map(|(e, _)| e.contrast));
-    let open: Vec<bool> = evidence.iter().map(|e| is_open(e, typical, OPENNESS)).collect();
+    // Among caps nothing bounds the pixels that such a cell gets; its opening is no less a cell.
+    let shaped = |i: usize| {
+        clear[i]
+            || evidence[i].unevenness <= UNEVENNESS && (!whole[i] || evidence[i].raggedness <= RAGGEDNESS)
+    };
+    let is_open = |i: usize, openness: f64| shaped(i) && is_open(&evidence[i], typical, openness);
+    let open: Vec<bool> = (0..centres.len()).map(|i| is_open(i, OPENNESS)).collect();
     let anchored = pieces(centres, pitches, &open);
     let grid = Grid::of(centres, median(pitches.iter().copied()).max(1.0));
     let partial = |i: usize| {
@@ -59,7 +69,7 @@ pub(crate) fn classify(
     (0..centres.len())
         .map(|i| match (anchored[i], inside[i]) {
             (true, _) => Kind::Seen,
-            (false, true) if is_open(&evidence[i], typical, ENCLOSED_OPENNESS) => Kind::Seen,
+            (false, true) if is_open(i, ENCLOSED_OPENNESS) => Kind::Seen,
             (false, false) if partial(i) => Kind::Seen,
             (false, true) => Kind::Hidden,
             (false, false) => Kind::Outside,
@@ -72,7 +82,6 @@ fn is_open(evidence: &Evidence, typical: f64, least_openness: f64) -> bool {
         && evidence.openness >= least_openness
         && evidence.rise >= RISE
         && evidence.contrast >= CONTRAST * typical
-        && evidence.unevenness <= UNEVENNESS
 }
 
 /// The open cells of every group of at least [`PIECE`] that touch one another.

@@ -15,6 +15,8 @@ const LIGHT_REACH: f64 = 1.2;
 const DETAIL: f32 = 2.0;
 /// Walls are at about +1 after levelling; anything brighter is a glint and is cut.
 pub(crate) const GLINT: f32 = 1.6;
+/// Variance of what is flat.
+const FLAT: f32 = 1e-6;
 /// Weight of the prior (grey walls) in the wall colour, as a share of the colours' variance.
 const COLOUR_RIDGE: f64 = 0.05;
 
@@ -75,36 +77,46 @@ impl WallColour {
     }
 }
 
-/// Levels the light: minus the local mean, over the local root mean square, glints cut.
+/// Levels the light: minus the local mean, over the local standard deviation, glints cut; twice.
 pub(crate) fn levelled(wallness: &Plane, pitch: f64) -> Plane {
-    let reach = LIGHT_REACH * pitch;
-    level(&level(wallness, reach, DETAIL), reach, GLINT)
+    let (width, height, reach) = (wallness.width(), wallness.height(), LIGHT_REACH * pitch);
+    let first = Light::of([width, height], reach, |y, row| row.copy_from_slice(wallness.row(y)));
+    let once = |y: usize, row: &mut [f32]| {
+        row.copy_from_slice(wallness.row(y));
+        first.level(y, row, DETAIL);
+    };
+    let second = Light::of([width, height], reach, once);
+    let mut levelled = Plane::new(width, height, 0.0);
+    levelled.fill_rows(|y, row| {
+        once(y, row);
+        second.level(y, row, GLINT);
+    });
+    levelled
 }
 
-/// Local mean taken off and local root mean square brought to 1; what exceeds `limit` is cut.
-fn level(grey: &Plane, reach: f64, limit: f32) -> Plane {
-    let (width, height) = (grey.width(), grey.height());
-    let mean = Smooth::mean(width, height, reach, |y, row| row.copy_from_slice(grey.row(y)));
-    let detail = |y: usize, row: &mut [f32]| {
-        mean.row(y, row);
-        row.iter_mut().zip(grey.row(y)).for_each(|(m, v)| *m = v - *m);
-    };
-    let power = Smooth::mean(width, height, reach, |y, row| {
-        detail(y, row);
-        row.iter_mut().for_each(|d| *d *= *d);
-    });
-    let mut levelled = Plane::new(width, height, 0.0);
-    levelled.fill_rows_with(
-        || vec![0.0; width],
-        |powers, y, row| {
-            detail(y, row);
-            power.row(y, powers);
-            for (v, p) in row.iter_mut().zip(&*powers) {
-                *v = (*v / (p + 1e-6).sqrt()).clamp(-limit, limit);
-            }
-        },
-    );
-    levelled
+/// The light around each pixel.
+struct Light {
+    mean: Smooth,
+    /// One over the root mean square of what differs from the mean, so that a slope of the light does not count.
+    gain: Smooth,
+}
+
+impl Light {
+    /// The light within about `reach` pixels in a raster whose rows are given by `fill`.
+    fn of([width, height]: [usize; 2], reach: f64, fill: impl Fn(usize, &mut [f32]) + Sync) -> Self {
+        let mean = Smooth::mean(width, height, reach, &fill);
+        let power = Smooth::mean(width, height, reach, |y, row| {
+            fill(y, row);
+            mean.with_row(y, row, |v, mean| (v - mean) * (v - mean));
+        });
+        Self { mean, gain: power.map(|power| (power + FLAT).sqrt().recip()) }
+    }
+
+    /// Levels a row; what then exceeds `limit` is cut.
+    fn level(&self, y: usize, row: &mut [f32], limit: f32) {
+        self.mean.with_row(y, row, |v, mean| v - mean);
+        self.gain.with_row(y, row, |v, gain| (v * gain).clamp(-limit, limit));
+    }
 }
 
 type Moments = ([f64; FEATURES], [[f64; FEATURES]; FEATURES]);

@@ -9,7 +9,7 @@
 //! | read the file, bring it to another scale | `photo.rs`, `raster.rs`, `plane.rs` |
 //! | find the pitch: the scale at which most of the photograph is a hexagonal lattice | `pitch.rs`, `peaks.rs` |
 //! | level the light; learn the colour of walls against that of cells | `light.rs`, `smooth.rs` |
-//! | find the cells: blobs that continue a lattice, hidden cells inferred between them | `survey.rs`, `lattice.rs`, `grid.rs` |
+//! | find the cells: blobs that continue a lattice, clear ones amid it, hidden cells inferred between them | `survey.rs`, `lattice.rs`, `grid.rs` |
 //! | share the pixels among the cells: watershed on the walls | `watershed.rs`, `terrain.rs` |
 //! | measure each cell and each wall; seen, hidden, or beyond the comb | `walls.rs`, `evidence.rs`, `kinds.rs` |
 //! | count sides by walls and by Delaunay neighbours, decide, say how sure | `sides.rs`, `triangulation.rs`, `cell_status.rs` |

@@ -1,6 +1,9 @@
 //! Blobs of about one cell's size: a band-pass at the pitch, and its local maxima.
 
-use super::plane::Plane;
+use super::{
+    plane::{Plane, narrow},
+    smooth::Smooth,
+};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -20,16 +23,21 @@ pub(crate) struct Peak {
     pub(crate) position: DVec2,
     /// Height: about 1 for a typical cell of its surroundings.
     pub(crate) strength: f64,
+    /// Whether it stands out as an open cell among caps does.
+    pub(crate) clear: bool,
 }
 
 /// Response to bright blobs of one cell's size, divided by its own root mean square around.
 #[must_use]
 pub(crate) fn band_pass(grey: &Plane, pitch: f64) -> Plane {
-    let response = difference(grey, pitch);
-    let power = response.map(|v| v * v).blurred(REACH * pitch);
-    #[expect(clippy::cast_possible_truncation, reason = "a constant")]
-    let floor = (NOISE_FLOOR * NOISE_FLOOR) as f32;
-    response.zip(&power, |v, p| v / (p + floor).sqrt())
+    let mut response = difference(grey, pitch);
+    let square = |y: usize, row: &mut [f32]| {
+        row.iter_mut().zip(response.row(y)).for_each(|(v, s)| *v = s * s);
+    };
+    let power = Smooth::mean(grey.width(), grey.height(), REACH * pitch, square);
+    let floor = narrow(NOISE_FLOOR * NOISE_FLOOR);
+    response.fill_rows(|y, row| power.with_row(y, row, |v, power| v / (power + floor).sqrt()));
+    response
 }
 
 /// Difference of two Gaussian means: bright blobs of one cell's size.
@@ -45,7 +53,11 @@ pub(crate) fn maxima(response: &Plane, threshold: f32) -> Vec<Peak> {
         let row = response.row(y).iter().enumerate().filter(|(_, value)| **value >= threshold);
         let greatest = row.filter(|(x, _)| is_greatest(response, *x, y));
         greatest
-            .map(|(x, value)| Peak { position: refined(response, x, y), strength: f64::from(*value) })
+            .map(|(x, value)| Peak {
+                position: refined(response, x, y),
+                strength: f64::from(*value),
+                clear: false,
+            })
             .collect::<Vec<Peak>>()
     };
     (0..response.height()).into_par_iter().with_min_len(32).flat_map_iter(in_row).collect()

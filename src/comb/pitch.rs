@@ -103,7 +103,7 @@ fn at_level(pyramid: &Pyramid<'_>, pitch: f64) -> [PitchEstimate; 2] {
     let mut area = 0.0;
     for tile in tiles(pyramid.part(), scale) {
         let size = |length: usize| pixels(length as f64 * scale).max(4);
-        let grey = pyramid.raster(tile, size(tile.width), size(tile.height)).grey();
+        let grey = pyramid.rough(tile, size(tile.width), size(tile.height)).grey();
         area += (grey.width() * grey.height()) as f64;
         let bright = peaks::band_pass(&grey, LEVEL_PITCH);
         found[0].extend(neighbour_distances(&bright.map(|v| -v)));

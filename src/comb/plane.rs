@@ -6,8 +6,8 @@
 
 use rayon::prelude::*;
 
-/// Rows that one task works on; fixed, so that sums are the same for any number of threads.
-const BAND: usize = 128;
+/// Rows that one task smooths; fixed, so that sums are the same for any number of threads.
+const BAND: usize = 96;
 
 /// Rows that are not worth sharing among threads.
 const ROWS_PER_TASK: usize = 16;
@@ -68,12 +68,14 @@ impl Plane {
 
     /// The value at a point, bilinear between pixel centres (pixel (0, 0) covers 0 ≤ x, y < 1), clamped at the border.
     #[must_use]
+    #[inline]
     pub(crate) fn sample(&self, x: f64, y: f64) -> f32 {
         let (x0, x1, fx) = bracket(x - 0.5, self.width);
         let (y0, y1, fy) = bracket(y - 0.5, self.height);
-        let top = self.at(x0, y0) * (1.0 - fx) + self.at(x1, y0) * fx;
-        let bottom = self.at(x0, y1) * (1.0 - fx) + self.at(x1, y1) * fx;
-        top * (1.0 - fy) + bottom * fy
+        let (upper, lower) = (self.row(y0), self.row(y1));
+        let top = upper[x0] + (upper[x1] - upper[x0]) * fx;
+        let bottom = lower[x0] + (lower[x1] - lower[x0]) * fx;
+        top + (bottom - top) * fy
     }
 
     /// A raster of `f(value)`.
@@ -116,9 +118,32 @@ impl Plane {
             return self.clone();
         }
         if sigma <= 2.5 {
-            return self.convolved(&gaussian(sigma));
+            let half = gaussian(sigma);
+            return self.by_bands(half.len() - 1, |band| band.convolved_rows(&half).convolved_columns(&half));
         }
-        box_radii(sigma).iter().fold(self.clone(), |plane, radius| plane.box_mean(*radius))
+        let radii = box_radii(sigma);
+        self.by_bands(radii.iter().sum(), |mut band| {
+            for radius in radii {
+                band = band.box_rows(radius).box_columns(radius);
+            }
+            band
+        })
+    }
+
+    /// What `filter`, which reaches over `reach` rows, makes of the raster, band by band.
+    fn by_bands(&self, reach: usize, filter: impl Fn(Self) -> Self + Sync) -> Self {
+        let (width, height) = (self.width.max(1), self.height);
+        let mut out = Self::new(self.width, height, 0.0);
+        out.data.par_chunks_mut(BAND * width).enumerate().for_each(|(band, rows)| {
+            let first = band * BAND;
+            let above = first.saturating_sub(reach);
+            let below = (first + rows.len() / width + reach).min(height);
+            let part =
+                Self { width, height: below - above, data: self.data[above * width..below * width].to_vec() };
+            let start = (first - above) * width;
+            rows.copy_from_slice(&filter(part).data[start..start + rows.len()]);
+        });
+        out
     }
 
     /// Calls `fill` with the number and the values of every row.
@@ -137,23 +162,17 @@ impl Plane {
         rows.for_each_init(space, |space, (y, row)| fill(space, y, row));
     }
 
-    /// Separable convolution with a symmetric kernel given from its centre outward.
-    fn convolved(&self, half: &[f32]) -> Self {
-        let across = self.convolved_rows(half);
-        across.convolved_columns(half)
-    }
-
+    /// Means along rows with a symmetric kernel given from its centre outward.
     fn convolved_rows(&self, half: &[f32]) -> Self {
         let (width, reach) = (self.width, half.len() - 1);
         let inner = reach..width.saturating_sub(reach).max(reach);
         let mut out = Self::new(width, self.height, 0.0);
-        out.fill_rows(|y, row| {
-            let source = self.row(y);
+        for (row, source) in self.pairs(&mut out.data) {
             for (x, v) in row.iter_mut().enumerate().filter(|(x, _)| !inner.contains(x)) {
                 *v = border_mean(half, x, width, |k| source[k]);
             }
             // One weight after the other, over the whole row, which a processor does several pixels at a time.
-            let Some(row) = row.get_mut(inner.clone()) else { return };
+            let Some(row) = row.get_mut(inner.clone()).filter(|row| !row.is_empty()) else { continue };
             let shifted = |by: usize| &source[by..by + inner.len()];
             for (v, s) in row.iter_mut().zip(shifted(reach)) {
                 *v = half[0] * s;
@@ -163,74 +182,80 @@ impl Plane {
                     *v += weight * (a + b);
                 }
             }
-        });
+        }
         out
     }
 
+    /// The same along columns.
     fn convolved_columns(&self, half: &[f32]) -> Self {
         let (width, height, reach) = (self.width, self.height, half.len() - 1);
         let mut out = Self::new(width, height, 0.0);
-        out.fill_rows(|y, row| {
+        for (y, row) in out.data.chunks_exact_mut(width).enumerate() {
             let first = y.saturating_sub(reach);
             let last = (y + reach).min(height - 1);
             let total: f32 = (first..=last).map(|k| half[k.abs_diff(y)]).sum();
             for k in first..=last {
                 let weight = half[k.abs_diff(y)] / total;
-                for (v, s) in row.iter_mut().zip(&self.data[k * width..(k + 1) * width]) {
+                for (v, s) in row.iter_mut().zip(self.row(k)) {
                     *v += weight * s;
                 }
             }
-        });
+        }
         out
     }
 
-    /// Mean over the square of the given radius, clipped to the raster.
-    fn box_mean(&self, radius: usize) -> Self {
-        self.box_rows(radius).box_columns(radius)
+    /// Rows of another raster of this size, each with the one of this.
+    fn pairs<'a>(&'a self, other: &'a mut [f32]) -> impl Iterator<Item = (&'a mut [f32], &'a [f32])> {
+        other.chunks_exact_mut(self.width).zip(self.data.chunks_exact(self.width))
     }
 
+    /// Means along rows over `radius` pixels to both sides.
     fn box_rows(&self, radius: usize) -> Self {
         let width = self.width;
         let mut out = Self::new(width, self.height, 0.0);
-        out.fill_rows(|y, row| {
-            let source = self.row(y);
-            let mut sum: f64 = source[..radius.min(width)].iter().map(|v| f64::from(*v)).sum();
-            for (x, v) in row.iter_mut().enumerate() {
-                if x + radius < width {
-                    sum += f64::from(source[x + radius]);
-                }
-                if x > radius {
-                    sum -= f64::from(source[x - radius - 1]);
-                }
-                let count = (x + radius).min(width - 1) - x.saturating_sub(radius) + 1;
-                *v = narrow(sum / count as f64);
+        // Columns around which nothing is missing.
+        let inner = radius.min(width)..width.saturating_sub(radius).max(radius.min(width));
+        let share = (2.0 * radius as f64 + 1.0).recip();
+        // Sums of all pixels before each.
+        let mut sums = vec![0.0; width + 1];
+        for (row, source) in self.pairs(&mut out.data) {
+            let mut sum = 0.0;
+            for (after, v) in sums[1..].iter_mut().zip(source) {
+                sum += f64::from(*v);
+                *after = sum;
             }
-        });
+            for (x, v) in row.iter_mut().enumerate().filter(|(x, _)| !inner.contains(x)) {
+                let (first, end) = (x.saturating_sub(radius), (x + radius + 1).min(width));
+                *v = narrow((sums[end] - sums[first]) / (end - first) as f64);
+            }
+            let ends = sums.iter().skip(2 * radius + 1);
+            for ((v, first), end) in row[inner.clone()].iter_mut().zip(&sums).zip(ends) {
+                *v = narrow((end - first) * share);
+            }
+        }
         out
     }
 
+    /// The same along columns.
     fn box_columns(&self, radius: usize) -> Self {
         let (width, height) = (self.width, self.height);
-        let row_of = |y: usize| &self.data[y * width..(y + 1) * width];
         let mut out = Self::new(width, height, 0.0);
-        out.data.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, rows)| {
-            let start = band * BAND;
-            let mut sum = vec![0.0_f64; width];
-            for y in start.saturating_sub(radius)..(start + radius).min(height) {
-                sum.iter_mut().zip(row_of(y)).for_each(|(s, v)| *s += f64::from(*v));
+        let mut sums = vec![0.0; width];
+        let change = |sums: &mut [f64], y: usize, sign: f64| {
+            sums.iter_mut().zip(self.row(y)).for_each(|(sum, v)| *sum += sign * f64::from(*v));
+        };
+        (0..radius.min(height)).for_each(|y| change(&mut sums, y, 1.0));
+        for (y, row) in out.data.chunks_exact_mut(width).enumerate() {
+            if y + radius < height {
+                change(&mut sums, y + radius, 1.0);
             }
-            for (offset, row) in rows.chunks_mut(width).enumerate() {
-                let y = start + offset;
-                if y + radius < height {
-                    sum.iter_mut().zip(row_of(y + radius)).for_each(|(s, v)| *s += f64::from(*v));
-                }
-                if offset > 0 && y > radius {
-                    sum.iter_mut().zip(row_of(y - radius - 1)).for_each(|(s, v)| *s -= f64::from(*v));
-                }
-                let count = ((y + radius).min(height - 1) - y.saturating_sub(radius) + 1) as f64;
-                row.iter_mut().zip(&sum).for_each(|(v, s)| *v = narrow(s / count));
+            if y > radius {
+                change(&mut sums, y - radius - 1, -1.0);
             }
-        });
+            let count = (y + radius).min(height - 1) - y.saturating_sub(radius) + 1;
+            let share = (count as f64).recip();
+            row.iter_mut().zip(&sums).for_each(|(v, sum)| *v = narrow(sum * share));
+        }
         out
     }
 }
@@ -249,6 +274,7 @@ pub(crate) const fn narrow(value: f64) -> f32 {
     reason = "clamped to the raster before the cast"
 )]
 #[must_use]
+#[inline]
 pub(crate) fn pixel(coordinate: f64, size: usize) -> usize {
     coordinate.clamp(0.0, size.saturating_sub(1) as f64) as usize
 }
@@ -259,10 +285,18 @@ pub(crate) fn pixels(length: f64) -> usize {
     pixel(length.round(), usize::MAX >> 12)
 }
 
+/// The pixels whose middles lie before and after a coordinate, and the share of the second.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the raster before the cast; a signed number of 32 bits is what a processor makes quickest"
+)]
+#[inline]
 fn bracket(x: f64, size: usize) -> (usize, usize, f32) {
     let clamped = x.clamp(0.0, size.saturating_sub(1) as f64);
-    let low = pixel(clamped, size);
-    (low, (low + 1).min(size - 1), narrow(clamped - low as f64))
+    let low = clamped as i32;
+    let share = narrow(clamped - f64::from(low));
+    (low as usize, (low as usize + 1).min(size - 1), share)
 }
 
 fn border_mean(half: &[f32], x: usize, size: usize, value: impl Fn(usize) -> f32) -> f32 {

@@ -1,8 +1,8 @@
 //! Parts of a photograph at other scales.
 //!
 //! A pyramid holds the part in the photograph's own resolution, halved, halved again, and so on; a raster is resampled from
-//! the level that has at least two pixels per pixel wanted, so that a small raster costs little whatever the photograph's
-//! size.
+//! a level that has at least two pixels, or one, per pixel wanted, so that a small raster costs little whatever the
+//! photograph's size.
 
 use super::{
     photo::{Part, Photo, Samples},
@@ -54,8 +54,18 @@ impl<'a> Pyramid<'a> {
     /// `frame`, which lies within the part, as a raster of `width` x `height`: means over the area of each pixel when
     /// shrinking, bilinear when enlarging.
     pub(crate) fn raster(&self, frame: Part, width: usize, height: usize) -> Raster<'_> {
+        self.sampled(frame, width, height, 2.0)
+    }
+
+    /// The same from a level that has at least one pixel per pixel wanted: quicker and slightly blurred.
+    pub(crate) fn rough(&self, frame: Part, width: usize, height: usize) -> Raster<'_> {
+        self.sampled(frame, width, height, 1.0)
+    }
+
+    /// A raster from the coarsest level that has at least `density` pixels per pixel wanted along each axis.
+    fn sampled(&self, frame: Part, width: usize, height: usize, density: f64) -> Raster<'_> {
         let step = (frame.width as f64 / width as f64).min(frame.height as f64 / height as f64);
-        let fine = self.levels.iter().rev().find(|level| level.unit * 2.0 <= step);
+        let fine = self.levels.iter().rev().find(|level| level.unit * density <= step);
         let level = fine.unwrap_or(&self.levels[0]);
         let axis = |side: usize, first: usize, start: usize, length: usize, out: usize, size: usize| {
             let from = level.corner[side] + (first - start) as f64 / level.unit;
@@ -90,8 +100,8 @@ impl Raster<'_> {
     /// The value of every pixel's colour: red, green and blue in 0..=1 as stored (not linearised).
     pub(crate) fn plane(&self, value: impl Fn([f32; 3]) -> f32 + Sync) -> Plane {
         let mut plane = Plane::new(self.width(), self.height(), 0.0);
-        plane.fill_rows_with(Vec::new, |sums, y, out| {
-            out.iter_mut().zip(self.row(y, sums)).for_each(|(v, colour)| *v = value(colour));
+        plane.fill_rows_with(Row::default, |space, y, out| {
+            out.iter_mut().zip(self.row(y, space)).for_each(|(v, colour)| *v = value(*colour));
         });
         plane
     }
@@ -100,34 +110,39 @@ impl Raster<'_> {
     fn bytes(&self) -> Vec<u8> {
         let mut bytes = vec![0; 3 * self.width() * self.height()];
         let rows = bytes.par_chunks_mut((3 * self.width()).max(1)).enumerate();
-        rows.for_each_init(Vec::new, |sums, (y, out)| {
-            for (pixel, colour) in out.chunks_exact_mut(3).zip(self.row(y, sums)) {
-                pixel.iter_mut().zip(colour).for_each(|(v, c)| *v = byte(c));
+        rows.for_each_init(Row::default, |space, (y, out)| {
+            for (pixel, colour) in out.chunks_exact_mut(3).zip(self.row(y, space)) {
+                pixel.iter_mut().zip(colour).for_each(|(v, c)| *v = byte(*c));
             }
         });
         bytes
     }
 
-    /// The colours of a row; `sums` is working space.
-    fn row(&self, y: usize, sums: &mut Vec<f32>) -> impl Iterator<Item = [f32; 3]> {
+    /// The colours of a row, in the working space given.
+    fn row<'a>(&self, y: usize, space: &'a mut Row) -> &'a [[f32; 3]] {
         let range = self.columns.range();
+        let Row { sums, colours } = space;
         sums.clear();
-        sums.resize(3 * range.len(), 0.0);
+        sums.resize(range.len(), [0.0; 3]);
         for (row, weight) in self.rows.of(y) {
             match self.photo.row(row, range.clone()) {
                 Samples::Eight(row) => add(sums, row, weight / f32::from(u8::MAX)),
                 Samples::Sixteen(row) => add(sums, row, weight / f32::from(u16::MAX)),
             }
         }
-        let sums = &*sums;
-        (0..self.width()).map(move |x| {
+        // In the photograph's own resolution every column is one of the photograph's.
+        if self.columns.weights.len() == sums.len() && sums.len() == self.width() {
+            return sums;
+        }
+        colours.clear();
+        colours.extend((0..self.width()).map(|x| {
             let mut colour = [0.0; 3];
             for (column, weight) in self.columns.of(x) {
-                let at = 3 * (column - range.start);
-                colour.iter_mut().zip(&sums[at..at + 3]).for_each(|(c, s)| *c += weight * s);
+                colour.iter_mut().zip(sums[column - range.start]).for_each(|(c, s)| *c += weight * s);
             }
             colour
-        })
+        }));
+        colours
     }
 
     /// The mean of the three channels.
@@ -171,8 +186,17 @@ fn byte(value: f32) -> u8 {
     (value * 255.0 + 0.5).clamp(0.0, 255.0) as u8
 }
 
-fn add<T: Copy + Into<f32>>(sums: &mut [f32], row: &[T], weight: f32) {
-    sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * (*value).into());
+fn add<T: Copy + Into<f32>>(sums: &mut [[f32; 3]], row: &[T], weight: f32) {
+    let sums = sums.as_flattened_mut().iter_mut();
+    sums.zip(row).for_each(|(sum, value)| *sum += weight * (*value).into());
+}
+
+/// Working space for a row.
+#[derive(Default)]
+struct Row {
+    /// Sums over the photograph's rows, in its columns.
+    sums: Vec<[f32; 3]>,
+    colours: Vec<[f32; 3]>,
 }
 
 /// Which source pixels, with which weights, make each output pixel along one axis.

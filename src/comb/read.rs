@@ -152,6 +152,7 @@ struct Segmented {
     centres: Vec<DVec2>,
     markers: Vec<DVec2>,
     by_hand: Vec<bool>,
+    clear: Vec<bool>,
     pitches: Vec<f64>,
     regions: Vec<Region>,
     walls: BTreeMap<(usize, usize), Wall>,
@@ -179,6 +180,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
     let markers: Vec<DVec2> = kept.iter().map(|i| centres[*i]).collect();
     let by_hand =
         kept.iter().map(|i| survey.sites[*i].by_hand || joined.iter().any(|(a, _)| a == i)).collect();
+    let clear = kept.iter().map(|i| survey.sites[*i].clear).collect();
     let regions = walls::regions(&segmentation, &relief, &markers, &pitches);
     let walls = walls::walls(&segmentation, &relief, &regions);
     let centres = regions
@@ -186,7 +188,7 @@ fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usiz
         .zip(&markers)
         .map(|(r, m)| if r.area > 0.0 && !r.on_border { r.centroid } else { *m })
         .collect();
-    Segmented { segmentation, relief, centres, markers, by_hand, pitches, regions, walls }
+    Segmented { segmentation, relief, centres, markers, by_hand, clear, pitches, regions, walls }
 }
 
 fn marked(centres: &[DVec2], pitches: &[f64], sites: &[Site]) -> Vec<Marker> {
@@ -261,7 +263,7 @@ fn halves(
 }
 
 fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
-    let Segmented { segmentation, relief, mut centres, markers, by_hand, pitches, regions, walls } =
+    let Segmented { segmentation, relief, mut centres, markers, by_hand, clear, pitches, regions, walls } =
         segmented;
     let rasters = Rasters { relief: &relief, wallness: &survey.wallness, segmentation: &segmentation };
     let insides: Vec<f64> = regions.iter().map(|r| r.inside).collect();
@@ -274,7 +276,7 @@ fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
         })
         .collect();
     let whole: Vec<bool> = cut.iter().map(|c| !c).collect();
-    let mut kinds = kinds::classify(&centres, &pitches, &evidence, &whole);
+    let mut kinds = kinds::classify(&centres, &pitches, &evidence, &whole, &clear);
     for (kind, by_hand) in kinds.iter_mut().zip(&by_hand) {
         if *by_hand {
             *kind = Kind::Seen;

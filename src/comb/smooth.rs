@@ -5,7 +5,7 @@ use super::plane::{Plane, narrow, pixel, pixels};
 /// Pixels of the coarse raster per standard deviation: the mean between them is a straight line within a percent.
 const PER_SIGMA: f64 = 5.0;
 
-/// A Gaussian mean of a raster.
+/// What varies slowly over a raster.
 #[derive(Clone, Debug)]
 pub(crate) struct Smooth {
     coarse: Plane,
@@ -16,7 +16,7 @@ pub(crate) struct Smooth {
 }
 
 impl Smooth {
-    /// The mean, with standard deviation `sigma` pixels, of a raster whose rows are given by `fill`.
+    /// The Gaussian mean, with standard deviation `sigma` pixels, of a raster whose rows are given by `fill`.
     pub(crate) fn mean(
         width: usize,
         height: usize,
@@ -29,16 +29,21 @@ impl Smooth {
         Self { coarse, block, columns }
     }
 
-    /// The means of a row of the raster.
-    pub(crate) fn row(&self, y: usize, out: &mut [f32]) {
+    /// What `f` makes of the means.
+    pub(crate) fn map(self, f: impl Fn(f32) -> f32 + Sync) -> Self {
+        Self { coarse: self.coarse.map(f), ..self }
+    }
+
+    /// Gives every value of a row of the raster to `change` with the mean around it, and takes what that makes of it.
+    pub(crate) fn with_row(&self, y: usize, row: &mut [f32], change: impl Fn(f32, f32) -> f32) {
         let (above, share) = between(y, self.block, self.coarse.height());
         let below = self.coarse.row((above + 1).min(self.coarse.height() - 1));
-        let above = self.coarse.row(above);
-        let at = |k: usize| above[k] + share * (below[k] - above[k]);
-        let last = self.coarse.width() - 1;
-        for (v, (left, share)) in out.iter_mut().zip(&self.columns) {
-            let (a, b) = (at(*left), at((left + 1).min(last)));
-            *v = a + share * (b - a);
+        let mut means: Vec<f32> =
+            self.coarse.row(above).iter().zip(below).map(|(a, b)| a + share * (b - a)).collect();
+        means.extend(means.last().copied());
+        for (v, (left, share)) in row.iter_mut().zip(&self.columns) {
+            let (a, b) = (means[*left], means[left + 1]);
+            *v = change(*v, a + share * (b - a));
         }
     }
 }
@@ -52,8 +57,8 @@ pub(crate) fn reduced(
 ) -> Plane {
     let mut coarse = Plane::new(width.div_ceil(block), height.div_ceil(block), 0.0);
     coarse.fill_rows_with(
-        || (vec![0.0; width], vec![0.0; width]),
-        |(sums, row), y, out| {
+        || [vec![0.0; width], vec![0.0; width]],
+        |[sums, row], y, out| {
             let rows = y * block..((y + 1) * block).min(height);
             let count = rows.len();
             sums.fill(0.0);

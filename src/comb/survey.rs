@@ -15,6 +15,7 @@ use super::{
     triangulation::Delaunay,
 };
 use glam::DVec2;
+use rayon::prelude::*;
 
 /// Pixels per pitch at which blobs are looked for, as nearly as whole blocks of working pixels allow.
 const SURVEY_PITCH: f64 = 15.0;
@@ -22,6 +23,9 @@ const SURVEY_PITCH: f64 = 15.0;
 const DARKEST: f32 = 0.02;
 /// Least contrast of a blob as a share of the regular ones' median.
 const LEAST_RATIO: f64 = 0.3;
+/// The same and the least strength of a blob that is a cell wherever it lies.
+const CLEAR_RATIO: f64 = 0.8;
+const CLEAR_STRENGTH: f64 = 1.6;
 /// Least strength of a blob, and of one that a lattice may grow from.
 const LEAST_STRENGTH: f32 = 0.15;
 const SEED_STRENGTH: f64 = 0.4;
@@ -55,12 +59,13 @@ pub(crate) fn survey(pyramid: &Pyramid<'_>, polarity: Polarity, scale: f64, pitc
     let extent = DVec2::new(relief.width() as f64, relief.height() as f64);
     let (sites, field) = blobs.sites(&small, extent / block as f64, Layers::Inferred);
     let unit = block as f64;
-    Survey {
-        wallness,
-        relief,
-        sites: sites.into_iter().map(|s| Site { position: s.position * unit, ..s }).collect(),
-        field: field.scaled(unit),
-    }
+    let mut sites: Vec<Site> = sites.into_iter().map(|s| Site { position: s.position * unit, ..s }).collect();
+    // As one reads: what lies together is then looked at together.
+    sites.sort_by(|a, b| {
+        let row = |site: &Site| (site.position.y / pitch).floor();
+        row(a).total_cmp(&row(b)).then(a.position.x.total_cmp(&b.position.x))
+    });
+    Survey { wallness, relief, sites, field: field.scaled(unit) }
 }
 
 /// What finds blobs in a small raster, whichever measure of wall that shows.
@@ -86,11 +91,11 @@ impl Blobs {
         let pitch = self.pitch;
         let response = peaks::band_pass(&relief.map(|v| -v), pitch);
         let maxima = peaks::maxima(&response, LEAST_STRENGTH);
-        let found = self.clear(peaks::thinned(maxima, |_| 0.5 * pitch, pitch));
+        let found = self.judged(peaks::thinned(maxima, |_| 0.5 * pitch, pitch));
         let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
         let regular = hexagonal_neighbourhoods(&points, pitch);
         let measured: Vec<(DVec2, f64)> =
-            regular.iter().zip(&points).filter_map(|(n, p)| n.map(|n| (*p, n.distance))).collect();
+            regular.iter().zip(&found).filter_map(|(n, p)| n.map(|n| (p.position, n.distance))).collect();
         let field = PitchField::new(extent, pitch, &measured);
         let is_seed = |p: &Peak| p.strength > SEED_STRENGTH;
         let seeds: Vec<bool> = regular.iter().zip(&found).map(|(n, p)| n.is_some() && is_seed(p)).collect();
@@ -98,14 +103,16 @@ impl Blobs {
     }
 
     /// Drops blobs whose contrast, as a ratio of brightness, is far below that of the regular ones: levelling the light
-    /// also levels up the texture of caps and of the ground.
-    fn clear(&self, found: Vec<Peak>) -> Vec<Peak> {
+    /// also levels up the texture of caps and of the ground. Those of at least the contrast of regular ones are clear.
+    fn judged(&self, found: Vec<Peak>) -> Vec<Peak> {
         let contrast = |p: &Peak| f64::from(self.ratio.sample(p.position.x, p.position.y));
         let points: Vec<DVec2> = found.iter().map(|p| p.position).collect();
         let regular = hexagonal_neighbourhoods(&points, self.pitch);
         let typical =
             median(found.iter().zip(&regular).filter(|(_, n)| n.is_some()).map(|(p, _)| contrast(p)));
-        found.into_iter().filter(|p| contrast(p) > LEAST_RATIO * typical).collect()
+        let is_clear = |p: &Peak| p.strength > CLEAR_STRENGTH && contrast(p) > CLEAR_RATIO * typical;
+        let kept = found.into_iter().filter(|p| contrast(p) > LEAST_RATIO * typical);
+        kept.map(|p| Peak { clear: is_clear(&p), ..p }).collect()
     }
 
     /// The wall colour, from the highest points between neighbouring cells against the cells' middles; `raster` has
@@ -121,8 +128,7 @@ impl Blobs {
                 .max_by(|p, q| height(p).total_cmp(&height(q)))
         };
         let walls: Vec<DVec2> = Delaunay::of(&seen)
-            .edges()
-            .iter()
+            .unsorted_edges()
             .map(|edge| (seen[edge.ends.0], seen[edge.ends.1]))
             .filter(|(a, b)| a.distance(*b) < 1.3 * self.pitch)
             .filter_map(|(a, b)| crest(a, b))

@@ -1,7 +1,14 @@
 //! The Delaunay triangulation of cell centres.
 
 use glam::DVec2;
-use spade::{DelaunayTriangulation, HasPosition, HierarchyHintGenerator, Point2, Triangulation as _};
+use rayon::prelude::*;
+use spade::{
+    DelaunayTriangulation, HasPosition, HierarchyHintGenerator, Point2, Triangulation as _,
+    handles::{DirectedEdgeHandle, FixedUndirectedEdgeHandle},
+};
+
+/// Edges that are not worth sharing among threads.
+const EDGES_PER_TASK: usize = 512;
 
 /// A triangulation in which a place is found in O(log n).
 type Triangulated = DelaunayTriangulation<Centre, (), (), (), HierarchyHintGenerator<f64>>;
@@ -71,17 +78,25 @@ impl Delaunay {
         self.triangulation.inner_faces().map(|face| face.vertices().map(|vertex| vertex.data().index))
     }
 
+    /// All edges, in no particular order.
+    pub(crate) fn unsorted_edges(&self) -> impl IndexedParallelIterator<Item = Edge> {
+        let edges: Vec<FixedUndirectedEdgeHandle> = self.triangulation.fixed_undirected_edges().collect();
+        edges.into_par_iter().with_min_len(EDGES_PER_TASK).map(|edge| self.edge(edge))
+    }
+
+    fn edge(&self, edge: FixedUndirectedEdgeHandle) -> Edge {
+        let edge = self.triangulation.undirected_edge(edge);
+        let [a, b] = edge.vertices().map(|vertex| vertex.data().index);
+        let third = |side: DirectedEdgeHandle<'_, Centre, (), (), ()>| {
+            side.opposite_vertex().map(|vertex| vertex.data().index)
+        };
+        let side = edge.as_directed();
+        Edge { ends: (a.min(b), a.max(b)), thirds: [third(side), third(side.rev())] }
+    }
+
     /// All edges, in ascending order of their ends.
     pub(crate) fn edges(&self) -> Vec<Edge> {
-        let edge_of = |edge: spade::handles::UndirectedEdgeHandle<'_, Centre, (), (), ()>| {
-            let [a, b] = edge.vertices().map(|vertex| vertex.data().index);
-            let third = |side: spade::handles::DirectedEdgeHandle<'_, Centre, (), (), ()>| {
-                side.opposite_vertex().map(|vertex| vertex.data().index)
-            };
-            let side = edge.as_directed();
-            Edge { ends: (a.min(b), a.max(b)), thirds: [third(side), third(side.rev())] }
-        };
-        let mut edges: Vec<Edge> = self.triangulation.undirected_edges().map(edge_of).collect();
+        let mut edges: Vec<Edge> = self.unsorted_edges().collect();
         edges.sort_unstable_by_key(|edge| edge.ends);
         edges
     }

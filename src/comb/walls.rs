@@ -100,7 +100,7 @@ fn bands(height: usize) -> Vec<Range<usize>> {
 fn parts_in(segmentation: &Segmentation, rows: Range<usize>, count: usize) -> Vec<Part> {
     let mut parts = vec![Part::default(); count];
     let (last_column, last_row) = (segmentation.width - 1, segmentation.height - 1);
-    for y in rows.clone() {
+    for y in rows {
         let mut start = 0;
         for run in segmentation.row(y).chunk_by(|a, b| a == b) {
             let end = start + run.len();
@@ -110,19 +110,27 @@ fn parts_in(segmentation: &Segmentation, rows: Range<usize>, count: usize) -> Ve
                 part.sum[0] += run.len() * (start + end - 1) / 2;
                 part.sum[1] += run.len() * y;
                 part.on_border |= start == 0 || end > last_column || y == 0 || y == last_row;
+            } else {
+                beside(segmentation, y, start..end, |cell| {
+                    if let Some(part) = parts.get_mut(cell as usize) {
+                        part.on_nothing = true;
+                    }
+                });
             }
             start = end;
         }
     }
-    for_meetings(segmentation, rows, |[x, y], [u, v]| {
-        let [one, other] = [segmentation.at(x, y), segmentation.at(u, v)];
-        for (cell, beside) in [(one, other), (other, one)] {
-            if beside == Segmentation::NONE {
-                parts[cell as usize].on_nothing = true;
-            }
-        }
-    });
     parts
+}
+
+/// Calls `meet` with the label of every pixel that touches a run of pixels of a row.
+fn beside(segmentation: &Segmentation, y: usize, run: Range<usize>, mut meet: impl FnMut(u32)) {
+    let above = y.checked_sub(1).into_iter();
+    for row in above.chain((y + 1 < segmentation.height).then_some(y + 1)) {
+        segmentation.row(row)[run.clone()].iter().for_each(|label| meet(*label));
+    }
+    let row = segmentation.row(y);
+    row[..run.start].last().into_iter().chain(row.get(run.end)).for_each(|label| meet(*label));
 }
 
 /// Calls `meet` with every two pixels beside one another that differ, the first one in the rows given.

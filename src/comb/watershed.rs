@@ -44,12 +44,13 @@ impl Segmentation {
     pub(crate) const NONE: u32 = u32::MAX;
 
     /// Whether a point lies on the raster.
+    #[inline]
     pub(crate) fn holds(&self, point: DVec2) -> bool {
-        let size = DVec2::new(self.width as f64, self.height as f64);
-        point.cmpge(DVec2::ZERO).all() && point.cmplt(size).all()
+        point.x >= 0.0 && point.y >= 0.0 && point.x < self.width as f64 && point.y < self.height as f64
     }
 
     /// The cell that owns the pixel at a point, if any.
+    #[inline]
     pub(crate) fn at_point(&self, point: DVec2) -> Option<usize> {
         if !self.holds(point) {
             return None;
@@ -60,9 +61,11 @@ impl Segmentation {
 
     /// Gives every pixel of cell `i` to cell `into[i]`, or to none.
     pub(crate) fn relabel(&mut self, into: &[Option<usize>]) {
-        for label in self.labels.iter_mut().filter(|l| **l != Self::NONE) {
-            *label = into[*label as usize].map_or(Self::NONE, crate::index::checked_u32);
-        }
+        let into: Vec<u32> = into.iter().map(|i| i.map_or(Self::NONE, crate::index::checked_u32)).collect();
+        self.labels.par_chunks_mut(self.width.max(1)).for_each(|row| {
+            row.iter_mut()
+                .for_each(|label| *label = into.get(*label as usize).copied().unwrap_or(Self::NONE));
+        });
     }
 
     /// The labels of a row.

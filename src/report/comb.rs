@@ -6,13 +6,14 @@ use super::{
     folder::{OutputError, OutputFolder},
 };
 use crate::{
-    comb::{Comb, Photo, Polarity, TableError, write_cells},
+    comb::{CellDetail, Comb, Photo, Polarity, TableError, write_cells},
     index::Id,
-    tessellation::{CellStatus, Defects, SideStatistics, defects, side_statistics},
+    tessellation::{Cell, CellId, CellStatus, Defects, SideStatistics, defects, side_statistics},
     units::Mm,
 };
+use rayon::prelude::*;
 use serde::Serialize;
-use std::io;
+use std::io::{self, Write};
 
 /// The name of the table of cells.
 pub const CELLS: &str = "cells.csv";
@@ -178,37 +179,62 @@ fn write_tables(
     write_cells(comb, &mut table)?;
     folder.write_bytes(CELLS, &table)?;
     folder.write_json("pattern.json", &comb.pattern)?;
-    folder.write_json("cells.geojson", &outlines(comb))?;
+    folder.write("cells.geojson", |file| file.write_all(&outlines(comb)?))?;
     folder.write_json("summary.json", summary)?;
     Ok(())
 }
 
-/// The outlines of the seen cells as GeoJSON, in pixels of the photograph with y downward, as annotation tools read it.
-fn outlines(comb: &Comb) -> serde_json::Value {
-    let features: Vec<serde_json::Value> = comb
-        .pattern
-        .cells
-        .enumerated()
-        .filter(|(id, _)| comb.details[*id].seen)
-        .map(|(id, cell)| {
-            let round = |v: f64| (v * 100.0).round() / 100.0;
-            let mut ring: Vec<[f64; 2]> =
-                comb.details[id].outline.iter().map(|p| [round(p.x), round(p.y)]).collect();
-            ring.extend(ring.first().copied());
-            serde_json::json!({
-                "type": "Feature",
-                "id": id.index(),
-                "properties": {
-                    "sides": cell.sides,
-                    "other_sides": comb.details[id].other_sides,
-                    "status": cell.status,
-                    "confidence": cell.confidence,
-                },
-                "geometry": { "type": "Polygon", "coordinates": [ring] },
-            })
-        })
-        .collect();
-    serde_json::json!({ "type": "FeatureCollection", "features": features })
+/// The outline of a cell as GeoJSON.
+#[derive(Serialize)]
+struct Feature {
+    r#type: &'static str,
+    id: usize,
+    properties: Properties,
+    geometry: Geometry,
+}
+
+#[derive(Serialize)]
+struct Properties {
+    sides: Option<u32>,
+    other_sides: Option<u32>,
+    status: CellStatus,
+    confidence: f64,
+}
+
+#[derive(Serialize)]
+struct Geometry {
+    r#type: &'static str,
+    coordinates: [Vec<[f64; 2]>; 1],
+}
+
+impl Feature {
+    fn new(id: CellId, cell: &Cell, detail: &CellDetail) -> Self {
+        let round = |v: f64| (v * 100.0).round() / 100.0;
+        let mut ring: Vec<[f64; 2]> = detail.outline.iter().map(|p| [round(p.x), round(p.y)]).collect();
+        ring.extend(ring.first().copied());
+        Self {
+            r#type: "Feature",
+            id: id.index(),
+            properties: Properties {
+                sides: cell.sides,
+                other_sides: detail.other_sides,
+                status: cell.status,
+                confidence: cell.confidence,
+            },
+            geometry: Geometry { r#type: "Polygon", coordinates: [ring] },
+        }
+    }
+}
+
+/// The outlines of the seen cells as GeoJSON, in pixels of the photograph with y downward, as annotation tools read it; a line
+/// for each.
+fn outlines(comb: &Comb) -> serde_json::Result<Vec<u8>> {
+    let seen: Vec<(CellId, &Cell)> =
+        comb.pattern.cells.enumerated().filter(|(id, _)| comb.details[*id].seen).collect();
+    let line = |(id, cell): (CellId, &Cell)| serde_json::to_vec(&Feature::new(id, cell, &comb.details[id]));
+    let lines = seen.into_par_iter().map(line).collect::<serde_json::Result<Vec<Vec<u8>>>>()?;
+    let text = [b"{\"type\":\"FeatureCollection\",\"features\":[\n", &*lines.join(&b",\n"[..]), b"\n]}\n"];
+    Ok(text.concat())
 }
 
 /// A photograph of a batch: its name, and what was read or why not.

@@ -4,6 +4,8 @@
 //! 5–7 pairs joined; cut cells outlined in grey; uncertain ones in white and hatched; hidden ones crossed. The legend stands
 //! below.
 
+mod strokes;
+
 use super::{
     comb::status_name,
     figure::{Anchor, Drawing, FigureError},
@@ -16,10 +18,10 @@ use crate::{
 use glam::DVec2;
 use image::{ExtendedColorType, ImageEncoder, RgbImage, codecs::png};
 use rayon::prelude::*;
-use resvg::tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, PixmapMut, Stroke, Transform};
+use strokes::{Ink, Sheet};
 
 /// Pixels per cell in the overlay: a larger photograph is reduced to it, so that the file stays small enough to be opened.
-const OVERLAY_PITCH: f64 = 64.0;
+const OVERLAY_PITCH: f64 = 48.0;
 /// Rows that are drawn as one task.
 const BAND: usize = 256;
 /// Height of a legend of one row, and what each further one adds.
@@ -37,16 +39,15 @@ pub(super) fn draw(comb: &Comb, photo: &Photo) -> Result<Vec<u8>, FigureError> {
     let [width, height] = [comb.width, comb.height].map(|length| to_u32(length as f64 * scale).max(1));
     let mut bytes = photo.scaled(width, height).into_raw();
     let defects = defects(&comb.pattern);
-    let rows = BAND * 3 * width as usize;
-    bytes.par_chunks_mut(rows.max(1)).enumerate().for_each(|(band, rows)| {
-        let mut sheet = with_alpha(rows);
-        let height = to_u32((rows.len() / (3 * width as usize)) as f64);
-        if let Some(pixmap) = PixmapMut::from_bytes(&mut sheet, width, height) {
-            Overlay { comb, scale, pixmap, top: (band * BAND) as f64 }.draw(&defects);
-        }
-        without_alpha(&sheet, rows);
-    });
-    let legend = legend(f64::from(width))?;
+    let row = 3 * width as usize;
+    let paint = || {
+        bytes.par_chunks_mut(BAND * row).enumerate().for_each(|(band, rows)| {
+            let sheet = Sheet::new(rows, width as usize);
+            Overlay { comb, scale, sheet, top: (band * BAND) as f64 }.draw(&defects);
+        });
+    };
+    let (legend, ()) = rayon::join(|| legend(f64::from(width)), paint);
+    let legend = legend?;
     bytes.extend_from_slice(legend.as_raw());
     let mut file = Vec::new();
     let encoder =
@@ -64,7 +65,7 @@ pub(super) fn scale(comb: &Comb) -> f64 {
 struct Overlay<'a> {
     comb: &'a Comb,
     scale: f64,
-    pixmap: PixmapMut<'a>,
+    sheet: Sheet<'a>,
     /// First row of the band in the overlay.
     top: f64,
 }
@@ -97,14 +98,12 @@ impl Overlay<'_> {
     fn meets(&self, y: f64) -> bool {
         let reach = 2.0 * self.comb.pitch * self.scale;
         let from = y * self.scale - self.top;
-        from > -reach && from < f64::from(self.pixmap.height()) + reach
+        from > -reach && from < self.sheet.height() as f64 + reach
     }
 
     fn pair(&mut self, ends: [DVec2; 2]) {
         if ends.iter().any(|end| self.meets(end.y)) {
-            let path = self.path(&ends, false);
-            self.stroke(path.as_ref(), Colour([255; 3]), 0.11, 1.0);
-            self.stroke(path.as_ref(), INK, 0.06, 1.0);
+            self.stroke(&ends, false, &[(Colour([255; 3]), 0.11, 1.0), (INK, 0.06, 1.0)]);
         }
     }
 
@@ -112,36 +111,30 @@ impl Overlay<'_> {
         let outline = &self.comb.details[id].outline;
         let centre = cell.position.truncate();
         let inner: Vec<DVec2> = outline.iter().map(|p| centre + (*p - centre) * 0.93).collect();
-        let path = self.path(&inner, true);
         let colour = match (cell.status, cell.sides) {
             (CellStatus::Complete, Some(sides)) => of_sides(sides),
             (CellStatus::Uncertain, _) => Colour([255; 3]),
             _ => GREY,
         };
-        if cell.status == CellStatus::Complete
-            && cell.sides != Some(6)
-            && let Some(path) = &path
-        {
-            self.pixmap.fill_path(path, &paint(colour, 0.45), FillRule::EvenOdd, Transform::identity(), None);
+        if cell.status == CellStatus::Complete && cell.sides != Some(6) {
+            let polygon = self.placed(&inner);
+            self.sheet.fill(&polygon, colour, 0.45);
         }
         if cell.status == CellStatus::Uncertain {
-            for [a, b] in hatching(&inner, 0.16 * self.comb.pitch) {
-                let line = self.path(&[a, b], false);
-                self.stroke(line.as_ref(), Colour([255; 3]), 0.03, 0.9);
+            for line in hatching(&inner, 0.16 * self.comb.pitch) {
+                self.stroke(&line, false, &[(Colour([255; 3]), 0.03, 0.9)]);
             }
         }
         // A dark rim sets the outline off from pale wax.
         let width = if cell.status == CellStatus::Cut { 0.03 } else { 0.05 };
-        self.stroke(path.as_ref(), INK, width + 0.03, 0.6);
-        self.stroke(path.as_ref(), colour, width, 0.95);
+        self.stroke(&inner, true, &[(INK, width + 0.03, 0.6), (colour, width, 0.95)]);
     }
 
     fn dot(&mut self, cell: &Cell) {
         let at = cell.position.truncate();
         let arm = DVec2::splat(0.08 * self.comb.pitch);
         for step in [arm, DVec2::new(arm.x, -arm.y)] {
-            let path = self.path(&[at - step, at + step], false);
-            self.stroke(path.as_ref(), GREY, 0.04, 0.9);
+            self.stroke(&[at - step, at + step], false, &[(GREY, 0.04, 0.9)]);
         }
     }
 
@@ -151,30 +144,25 @@ impl Overlay<'_> {
         let at = |(x, y): (f64, f64)| centre + DVec2::new(x, y) * unit;
         for stroke in strokes(digit) {
             let points: Vec<DVec2> = stroke.iter().map(|p| at(*p)).collect();
-            let path = self.path(&points, false);
-            self.stroke(path.as_ref(), INK, 0.11, 0.9);
-            self.stroke(path.as_ref(), Colour([255; 3]), 0.05, 1.0);
+            self.stroke(&points, false, &[(INK, 0.11, 0.9), (Colour([255; 3]), 0.05, 1.0)]);
         }
     }
 
-    fn path(&self, points: &[DVec2], closed: bool) -> Option<Path> {
-        let mut builder = PathBuilder::new();
-        for (index, point) in points.iter().enumerate() {
-            let (x, y) = (single(point.x * self.scale), single(point.y * self.scale - self.top));
-            if index == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
-        }
-        if closed {
-            builder.close();
-        }
-        builder.finish()
+    /// Points of the photograph in pixels of the band.
+    fn placed(&self, points: &[DVec2]) -> Vec<DVec2> {
+        points.iter().map(|p| *p * self.scale - DVec2::new(0.0, self.top)).collect()
     }
 
-    /// Strokes a path; the width is in pitches.
-    fn stroke(&mut self, path: Option<&Path>, colour: Colour, width: f64, opacity: f64) {
-        let Some(path) = path else { return };
-        let width = single((width * self.comb.pitch * self.scale).max(1.0));
-        let stroke = Stroke { width, line_cap: LineCap::Round, ..Stroke::default() };
-        self.pixmap.stroke_path(path, &paint(colour, opacity), &stroke, Transform::identity(), None);
+    /// Strokes a line in inks of colour, width in pitches, and opacity.
+    fn stroke(&mut self, points: &[DVec2], closed: bool, inks: &[(Colour, f64, f64)]) {
+        let placed = self.placed(points);
+        let unit = self.comb.pitch * self.scale;
+        let inks = inks.iter().map(|(colour, width, opacity)| Ink {
+            colour: *colour,
+            width: (width * unit).max(1.0),
+            opacity: *opacity,
+        });
+        self.sheet.stroke(&placed, closed, &inks.collect::<Vec<Ink>>());
     }
 }
 
@@ -296,28 +284,6 @@ fn legend(width: f64) -> Result<RgbImage, FigureError> {
         drawing.text([x + 22.0, y + 22.0], size, Anchor::Start, INK, &entry.text());
     }
     drawing.finish().raster(1.0)
-}
-
-fn paint(colour: Colour, opacity: f64) -> Paint<'static> {
-    let [r, g, b] = colour.0;
-    let mut paint = Paint { anti_alias: true, ..Paint::default() };
-    paint.set_color_rgba8(r, g, b, u8::try_from(to_u32(opacity * 255.0)).unwrap_or(u8::MAX));
-    paint
-}
-
-fn with_alpha(rows: &[u8]) -> Vec<u8> {
-    rows.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], u8::MAX]).collect()
-}
-
-fn without_alpha(sheet: &[u8], rows: &mut [u8]) {
-    for (pixel, drawn) in rows.chunks_exact_mut(3).zip(sheet.chunks_exact(4)) {
-        pixel.copy_from_slice(&drawn[..3]);
-    }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "drawing coordinates need no more than single precision")]
-const fn single(value: f64) -> f32 {
-    value as f32
 }
 
 #[expect(
