@@ -170,7 +170,7 @@ impl Assembled {
 
     /// The gradients of the held functionals.
     fn constrain(&mut self, problem: &Problem, state: &State) {
-        let slots = problem.gradients(&state.places, problem.slots()).functionals;
+        let slots = problem.functional_gradients(&state.places);
         let mut rows = IndexVec::from_elem(None, problem.functionals.len());
         for (at, &id) in self.held.iter().enumerate() {
             rows[id] = Some(checked_u32(self.gradient.len() + at));

@@ -147,7 +147,7 @@ impl Problem {
             self.push(&mut moved, vertex, velocity[vertex], scale);
             self.settle(&mut moved, vertex, false);
         }
-        let slots = self.gradients(&moved.places, self.slots()).functionals;
+        let slots = self.functional_gradients(&moved.places);
         let restoring = Restoring::new(self, &moved, &slots)?;
         let values = restoring.restore(self, &mut moved)?;
         Ok((moved, values))

@@ -6,9 +6,10 @@ use crate::{
         datafile::Representation,
         surface::{Directed, EdgeId, FacetId, Neighbours, Surface, VertexId, one_sided},
     },
-    index::IndexVec,
+    index::{Id, IndexVec},
 };
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// The normals at each vertex: one within a film, two where three films meet along a line, `None` (all directions) where
 /// lines meet.
@@ -20,7 +21,11 @@ pub(super) fn normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<Ve
 }
 
 fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Directions>> {
-    let areas: IndexVec<FacetId, DVec3> = surface.facets.ids().map(|id| surface.area_vector(id)).collect();
+    let areas: Vec<DVec3> = (0..surface.facets.len())
+        .into_par_iter()
+        .map(|at| surface.area_vector(FacetId::from_index(at)))
+        .collect();
+    let areas: IndexVec<FacetId, DVec3> = areas.into();
     // Neighbouring facets may be turned round: each is counted to the side of those before.
     let mut sums = IndexVec::from_elem(DVec3::ZERO, surface.vertices.len());
     for (id, facet) in surface.facets.enumerated() {
@@ -51,7 +56,9 @@ fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId
         }
         sums[id].try_normalize().map(|normal| Directions::of(&[normal]))
     };
-    surface.vertices.ids().map(normal_at).collect()
+    let normals: Vec<_> =
+        (0..surface.vertices.len()).into_par_iter().map(|at| normal_at(VertexId::from_index(at))).collect();
+    normals.into()
 }
 
 /// The two directions across the line that a vertex lies on.

@@ -1,19 +1,22 @@
 //! The terms of a surface: which fields are integrated over which element, and where they go.
 
 use super::{
-    edge::{BENT_POINTS, EdgeField, STRAIGHT_POINTS, rule},
+    edge::{BENT_POINTS, EdgeField, FINE_POINTS, STRAIGHT_POINTS, rule},
     facet::FacetField,
     field::VectorField,
     freedom::Hold,
-    problem::{Destination, EdgePart, Functional, FunctionalId, Measured, Part, Point, Problem, Term},
+    problem::{
+        Contact, Destination, EdgePart, Functional, FunctionalId, Measured, Part, Point, Problem, Term,
+    },
+    sliver::Sliver,
 };
 use crate::{
     evolver::{
-        datafile::{Datafile, FormulaVector, Method, Model, Purpose, Quantity, Representation},
+        datafile::{Datafile, FormulaVector, Method, Model, Purpose, Quantity, Representation, Side},
         error::EvolverError,
         language::formula::{Bound, Variables},
         surface::{
-            BodyId, Common, Directed, EdgeId, FacetId, Neighbours, Surface, VertexId, Wall, body_images,
+            BodyId, Common, Directed, Edge, EdgeId, FacetId, Neighbours, Surface, VertexId, Wall, body_images,
         },
     },
     index::{Id, IndexVec, checked_u32},
@@ -33,6 +36,8 @@ pub(crate) struct Conditions<'a> {
     pub(crate) quantities: &'a [QuantityState],
     /// Whether volumes count as quantities.
     pub(crate) relative: bool,
+    /// Whether contents are those of the wall itself, the slivers between it and the edges included.
+    pub(crate) on_walls: bool,
 }
 
 /// The numbers of a quantity that commands can change.
@@ -86,7 +91,8 @@ impl Problem {
                 .map(|b| b.coordinates.each_ref().map(|f| f.as_ref().map_or(Bound::constant(0.0), bind)))
                 .collect(),
             holds: surface.vertices.iter().map(|vertex| hold(&vertex.common)).collect(),
-            rules: rules(data),
+            rules: rules(data, conditions.on_walls),
+            contacts: Vec::new(),
             strings: surface.representation == Representation::String,
             relative: conditions.relative,
             pattern: OnceLock::new(),
@@ -121,8 +127,9 @@ fn hold(common: &Common) -> Hold {
     }
 }
 
-fn rules(data: &Datafile) -> [Vec<crate::foam::complex::CurvePoint>; 2] {
-    let points = |default: usize| data.edge_points.unwrap_or(default);
+fn rules(data: &Datafile, on_walls: bool) -> [Vec<crate::foam::complex::CurvePoint>; 2] {
+    let least = if on_walls { FINE_POINTS } else { 0 };
+    let points = |default: usize| data.edge_points.unwrap_or(default.max(least));
     [rule(2, points(STRAIGHT_POINTS)), rule(3, points(BENT_POINTS))]
 }
 
@@ -244,6 +251,8 @@ impl Collector<'_> {
             .chain(self.data.boundaries.iter().map(|b| (b.energy.clone(), b.content.clone())))
             .collect();
         let of_constraints = self.data.constraints.len();
+        let slivers = self.slivers();
+        let on_one_wall = |edge: &Edge| edge.common.constraints.len() == 1;
         for (at, (energy, content)) in integrands.iter().enumerate() {
             let on = |common: &Common| {
                 if at < of_constraints {
@@ -272,7 +281,8 @@ impl Collector<'_> {
                 let sign = if at < of_constraints { 1.0 } else { -1.0 };
                 for (id, edge) in self.surface.edges.enumerated().filter(|(_, edge)| on(&edge.common)) {
                     if !edge.noncontent {
-                        self.edge_content(id, field, sign);
+                        let sliver = slivers.get(at).copied().flatten().filter(|_| on_one_wall(edge));
+                        self.edge_content(id, (field, sliver), sign);
                     }
                 }
             }
@@ -280,10 +290,25 @@ impl Collector<'_> {
         self.gaps();
     }
 
+    /// What lies between edges and each constraint that has a content and holds edges from both sides.
+    fn slivers(&mut self) -> Vec<Option<u32>> {
+        let film = if self.data.symmetric_content { VectorField::Cone } else { VectorField::Height };
+        let mut slivers = Vec::new();
+        for constraint in &self.data.constraints {
+            let content = constraint.content.as_ref().filter(|_| constraint.side == Side::On);
+            slivers.push(content.map(|content| {
+                let wall = constraint.formula.bind(self.conditions.variables);
+                let sliver = Sliver { wall, content: self.vector(content), film: film.clone() };
+                self.edge_field(EdgePart::Sliver(Box::new(sliver)))
+            }));
+        }
+        slivers
+    }
+
     /// The content of an edge goes to the bodies of its facets, in the sense in which each facet runs along it.
-    fn edge_content(&mut self, edge: EdgeId, field: u32, factor: f64) {
-        for &(facet, at) in &self.neighbours.facets[edge] {
-            let facet = &self.surface.facets[facet];
+    fn edge_content(&mut self, edge: EdgeId, (field, sliver): (u32, Option<u32>), factor: f64) {
+        for &(id, at) in &self.neighbours.facets[edge] {
+            let facet = &self.surface.facets[id];
             if facet.noncontent {
                 continue;
             }
@@ -293,6 +318,21 @@ impl Collector<'_> {
                 let destination = Destination::Functional(FunctionalId::from_index(body.index()));
                 let part = Part { field, destination, weight: sign * along, offset: DVec3::ZERO };
                 self.edge_parts[edge.index()].push(part);
+                // The content is that of the edge as it is stored: an image of it has another sliver.
+                let Some(sliver) = sliver.filter(|_| self.images[id.index()][side] == IVec3::ZERO) else {
+                    continue;
+                };
+                if self.conditions.on_walls {
+                    self.edge_parts[edge.index()].push(Part { field: sliver, ..part });
+                }
+                self.problem.contacts.push(Contact {
+                    edge: edge_term(self.surface, edge),
+                    body,
+                    weight: part.weight,
+                    field,
+                    sliver,
+                    tension: facet.tension,
+                });
             }
         }
     }
@@ -428,18 +468,21 @@ impl Collector<'_> {
             if edge.tension.abs() <= 0.0 && parts.is_empty() {
                 continue;
             }
-            let mut nodes = vec![
-                (edge.ends[0], IVec3::ZERO),
-                (edge.ends[1], surface.wrap(Directed { edge: element, reversed: false })),
-            ];
-            if let Some(middle) = edge.middle {
-                nodes.insert(1, (middle, IVec3::ZERO));
-            }
-            let term = term(surface, &nodes, edge.tension);
+            let term = edge_term(surface, element);
             push(&mut self.problem.edges, &mut self.problem.edge_parts, term, parts);
         }
         self.problem
     }
+}
+
+fn edge_term(surface: &Surface, id: EdgeId) -> Term<3> {
+    let edge = &surface.edges[id];
+    let end = surface.wrap(Directed { edge: id, reversed: false });
+    let mut nodes = vec![(edge.ends[0], IVec3::ZERO), (edge.ends[1], end)];
+    if let Some(middle) = edge.middle {
+        nodes.insert(1, (middle, IVec3::ZERO));
+    }
+    term(surface, &nodes, edge.tension)
 }
 
 fn term<const N: usize>(surface: &Surface, corners: &[(VertexId, IVec3)], tension: f64) -> Term<N> {
