@@ -8,9 +8,11 @@ use super::{
 };
 use crate::{
     evolver::surface::BodyId,
+    foam::complex::CurvePoint,
     index::{Id, IndexVec},
 };
 use glam::DVec3;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// The contact lines of one body.
@@ -38,6 +40,16 @@ const BENT_ERROR: f64 = 1e-3;
 const MOST_ERROR: f64 = 0.02;
 
 impl ContactLine {
+    fn add(&mut self, share: &Self) {
+        self.cut += share.cut;
+        self.magnitude += share.magnitude;
+        self.films += share.films;
+        self.refined += share.refined;
+        if share.most > self.most {
+            (self.most, self.worst) = (share.most, share.worst);
+        }
+    }
+
     /// The part of the volume by which edges as many as these err when they lie as they should.
     pub(crate) fn mesh_error(&self, quadratic: bool) -> f64 {
         #[expect(clippy::cast_precision_loss, reason = "a count of edges")]
@@ -64,32 +76,38 @@ impl Problem {
         let mut lines = IndexVec::from_elem(ContactLine::default(), bodies);
         let mut edges: BTreeMap<(BodyId, u32), usize> = BTreeMap::new();
         let fine = [2, 3].map(|nodes| rule(nodes, FINE_POINTS));
-        for contact in &self.contacts {
-            let nodes = contact.edge.places(places.as_slice());
-            let nodes = &nodes[..usize::from(contact.edge.count)];
+        let shares: Vec<ContactLine> =
+            self.contacts.par_iter().map(|contact| self.contact_share(contact, places, &fine)).collect();
+        for (contact, share) in self.contacts.iter().zip(shares) {
             *edges.entry((contact.body, contact.sliver)).or_default() += 1;
-            let line = &mut lines[contact.body];
-            if let EdgePart::Sliver(sliver) = &self.edge_fields[contact.sliver as usize] {
-                let [volume, area] = sliver.value(nodes);
-                line.cut += contact.weight * volume;
-                line.magnitude += volume.abs();
-                line.films += contact.tension * area;
-            }
-            if let EdgePart::Field(field) = &self.edge_fields[contact.field as usize] {
-                let change =
-                    field.value(&fine[nodes.len() - 2], nodes) - field.value(self.rule(nodes.len()), nodes);
-                line.refined += contact.weight * change;
-                if change.abs() > line.most {
-                    line.most = change.abs();
-                    line.worst = 0.5 * (nodes[0] + nodes[nodes.len() - 1]);
-                }
-            }
+            lines[contact.body].add(&share);
         }
         for ((body, _), count) in edges {
             let line = &mut lines[body];
             line.edges = if line.edges == 0 { count } else { line.edges.min(count) };
         }
         lines
+    }
+
+    /// What one edge adds.
+    fn contact_share(&self, contact: &Contact, places: &Places, fine: &[Vec<CurvePoint>; 2]) -> ContactLine {
+        let nodes = contact.edge.places(places.as_slice());
+        let nodes = &nodes[..usize::from(contact.edge.count)];
+        let mut share = ContactLine::default();
+        if let EdgePart::Sliver(sliver) = &self.edge_fields[contact.sliver as usize] {
+            let [volume, area] = sliver.value(nodes);
+            share.cut = contact.weight * volume;
+            share.magnitude = volume.abs();
+            share.films = contact.tension * area;
+        }
+        if let EdgePart::Field(field) = &self.edge_fields[contact.field as usize] {
+            let change =
+                field.value(&fine[nodes.len() - 2], nodes) - field.value(self.rule(nodes.len()), nodes);
+            share.refined = contact.weight * change;
+            share.most = change.abs();
+            share.worst = 0.5 * (nodes[0] + nodes[nodes.len() - 1]);
+        }
+        share
     }
 
     /// The most that the edges of each body's contact lines could gain by what lies between them and the walls, at a pressure of

@@ -4,7 +4,7 @@ use super::freedom::Directions;
 use crate::{
     evolver::{
         datafile::Representation,
-        surface::{Directed, EdgeId, FacetId, Neighbours, Surface, VertexId, one_sided},
+        surface::{Directed, EdgeId, FacetId, Kind, Neighbours, Surface, VertexId, one_sided},
     },
     index::{Id, IndexVec},
 };
@@ -41,20 +41,18 @@ fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId
         sums[middle] =
             neighbours.facets[id].iter().map(|&(facet, _)| areas[facet]).fold(DVec3::ZERO, one_sided);
     }
-    let normal_at = |id: VertexId| {
-        let around: &[EdgeId] = match &middles[id] {
-            Some(edge) => std::slice::from_ref(edge),
-            None => &neighbours.edges[id],
-        };
-        if around.iter().all(|&edge| neighbours.facets[edge].is_empty()) {
-            return None;
-        }
-        let is_line = |edge: &EdgeId| neighbours.facets[*edge].len() > 2;
-        if around.iter().any(is_line) {
+    let normal_at = |id: VertexId| match neighbours.kinds[id] {
+        Kind::Bare => None,
+        Kind::Film => sums[id].try_normalize().map(|normal| Directions::of(&[normal])),
+        Kind::Line => {
+            let around: &[EdgeId] = match &middles[id] {
+                Some(edge) => std::slice::from_ref(edge),
+                None => &neighbours.edges[id],
+            };
+            let is_line = |edge: &EdgeId| neighbours.facets[*edge].len() > 2;
             let lines: Vec<EdgeId> = around.iter().copied().filter(is_line).collect();
-            return (lines.len() <= 2).then(|| line_normals(surface, id, &lines));
+            (lines.len() <= 2).then(|| line_normals(surface, id, &lines))
         }
-        sums[id].try_normalize().map(|normal| Directions::of(&[normal]))
     };
     let normals: Vec<_> =
         (0..surface.vertices.len()).into_par_iter().map(|at| normal_at(VertexId::from_index(at))).collect();

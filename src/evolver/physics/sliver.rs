@@ -196,7 +196,7 @@ mod tests {
         let text = format!("constraint 1\n{lines}\nvertices\n1 0 0 0\n");
         let document = Document::new(&Source::new("wall.fe", text)).unwrap();
         let data = &document.data;
-        let constraint = data.constraints.iter().next().unwrap();
+        let constraint = data.constraints.first().unwrap();
         let bind = |formula: &Option<crate::evolver::language::formula::Formula>| {
             formula.as_ref().map_or(Bound::constant(0.0), |formula| formula.bind(&data.variables))
         };

@@ -144,26 +144,32 @@ impl Session {
             return Ok(());
         };
         let here = current.problem.contact_ends(&current.state.places);
-        if !has_moved(&self.compared, &here) {
+        let edges: Vec<f64> = here.iter().map(|[a, b]| NEARBY_EDGES * a.distance(*b)).collect();
+        if !has_moved(&self.looked_at, &here, |at| edges[at]) {
             return Ok(());
         }
+        let size = here.iter().fold(0.0, |size: f64, [end, _]| size.max(end.distance(here[0][0])));
+        let elsewhere = has_moved(&self.compared, &here, |_| NEARBY_LINE * size);
         current.state.store(&mut self.surface);
         self.leave_chords()?;
-        self.compare_volumes()?;
-        self.compared = here;
+        if elsewhere {
+            self.compare_volumes()?;
+            self.compared.clone_from(&here);
+        }
+        self.looked_at = here;
         Ok(())
     }
 }
 
-/// How far the nodes of a contact line may move, as a part of its edges, before its contents are looked at again: that takes
-/// longer than a Newton step.
-const NEARBY: f64 = 0.05;
+/// How far the nodes of a contact line may move, as a part of its edges, before its slivers are looked at again, and as a part
+/// of its size before volumes are compared again: both take longer than a Newton step.
+const NEARBY_EDGES: f64 = 0.05;
+const NEARBY_LINE: f64 = 0.01;
 
-/// Whether a contact line, by the ends of its edges, is elsewhere than it was, or another one.
-fn has_moved(before: &[[DVec3; 2]], now: &[[DVec3; 2]]) -> bool {
-    let near = |(old, new): (&[DVec3; 2], &[DVec3; 2])| {
-        let limit = NEARBY * NEARBY * new[0].distance_squared(new[1]);
-        old.iter().zip(new).all(|(a, b)| a.distance_squared(*b) <= limit)
+/// Whether a contact line, by the ends of its edges, has moved by more than `limit`, or is another one.
+fn has_moved(before: &[[DVec3; 2]], now: &[[DVec3; 2]], limit: impl Fn(usize) -> f64) -> bool {
+    let far = |(at, (old, new)): (usize, (&[DVec3; 2], &[DVec3; 2]))| {
+        old.iter().zip(new).any(|(a, b)| a.distance(*b) > limit(at))
     };
-    before.len() != now.len() || !before.iter().zip(now).all(near)
+    before.len() != now.len() || before.iter().zip(now).enumerate().any(far)
 }

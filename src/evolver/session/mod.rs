@@ -92,7 +92,8 @@ pub struct Session {
     by_quantities: bool,
     /// Along what contents are integrated.
     contents: Contents,
-    /// The ends of the edges of contact lines when their contents were last looked at.
+    /// The ends of the edges of contact lines when their slivers were last looked at, and when volumes were last compared.
+    looked_at: Vec<[DVec3; 2]>,
     compared: Vec<[DVec3; 2]>,
     quiet: bool,
     eigenvalue: f64,
@@ -174,6 +175,7 @@ impl Session {
             normal: true,
             by_quantities: data.boundaries.iter().any(|b| b.energy.is_some() || b.content.is_some()),
             contents: Contents::Chords,
+            looked_at: Vec::new(),
             compared: Vec::new(),
             quiet: false,
             eigenvalue: f64::NAN,
