@@ -33,6 +33,13 @@ macro_rules! define_id {
         #[serde(transparent)]
         pub struct $name(u32);
 
+        impl std::fmt::Display for $name {
+            /// Its number, as in tables.
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                self.0.fmt(f)
+            }
+        }
+
         impl $crate::index::Id for $name {
             fn from_index(index: usize) -> Self {
                 Self($crate::index::checked_u32(index))

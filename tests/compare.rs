@@ -54,35 +54,42 @@ fn compared(comb: CellPattern, foam: CellPattern) -> Tried<Comparison> {
     Ok(compare(&samples([comb]), &samples([foam]), &Settings::default())?)
 }
 
-/// The share of 1000 pairs of the same process that the test finds different.
-fn level(maker: impl Fn(u64) -> Tried<CellPattern> + Sync) -> Tried<f64> {
+/// The share of 1000 pairs of the same process, of `sides` × `sides` cells each, that the test finds different.
+fn level(sides: [usize; 2], maker: impl Fn(usize, u64) -> Tried<CellPattern> + Sync) -> Tried<f64> {
     let rejected = |run: u64| -> Tried<bool> {
         let settings = Settings { permutations: 399, resamples: 99, seed: run, ..Settings::default() };
-        let pair = [samples([maker(2 * run)?]), samples([maker(2 * run + 1)?])];
+        let pair = [samples([maker(sides[0], 2 * run)?]), samples([maker(sides[1], 2 * run + 1)?])];
         Ok(compare(&pair[0], &pair[1], &settings)?.sides.p <= LEVEL)
     };
     let found: Vec<bool> = (0..1000).into_par_iter().map(rejected).collect::<Tried<_>>()?;
     Ok(found.iter().filter(|r| **r).count() as f64 / 1000.0)
 }
 
+/// Patterns of one size and of two.
+const SIDES: [[usize; 2]; 3] = [[14, 14], [10, 16], [20, 14]];
+
 #[test]
 fn the_test_rejects_true_nulls_at_its_level() -> Tried<()> {
-    let share = level(|seed| independent(14, seed))?;
-    // 5 % ± 1.5 %; the standard error of 1000 pairs is 0.7 %.
-    assert!((share - LEVEL).abs() <= 0.015, "independent cells: {share}");
+    for sides in SIDES {
+        let share = level(sides, independent)?;
+        // 5 % ± 1.5 %; the standard error of 1000 pairs is 0.7 %.
+        assert!((share - LEVEL).abs() <= 0.015, "independent cells, {sides:?}: {share}");
+    }
     Ok(())
 }
 
 #[test]
 fn cells_that_depend_on_their_neighbours_do_not_fool_the_test() -> Tried<()> {
     // Flips come in random number, two fives and two sevens each: a test that takes cells for independent rejects a fifth of
-    // these nulls. What links neighbouring patches is lost, so that a little more than 5 % is left.
-    let share = level(|seed| {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let flips = (0..400).filter(|_| random.random::<f64>() < 0.025).count();
-        torus(14, flips, seed)
-    })?;
-    assert!((0.02..=0.10).contains(&share), "pairs: {share}");
+    // these nulls, one that shuffles patches without regard to what links them a twelfth.
+    for sides in SIDES {
+        let share = level(sides, |side, seed| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let flips = (0..2 * side * side).filter(|_| random.random::<f64>() < 0.025).count();
+            torus(side, flips, seed)
+        })?;
+        assert!((share - LEVEL).abs() <= 0.015, "pairs, {sides:?}: {share}");
+    }
     Ok(())
 }
 
@@ -138,7 +145,7 @@ fn hexagons_and_random_defects_are_found_different() -> Tried<()> {
 fn too_few_cells_get_no_verdict() -> Tried<()> {
     let found = compared(torus(6, 3, 1)?, torus(14, 10, 2)?)?;
     assert_eq!(found.verdict.finding, Finding::TooFewCells);
-    assert!(found.verdict.sentence.contains("the comb has 36 complete cells in 3 patches"));
+    assert!(found.verdict.sentence.contains("the comb has 36 complete cells in 5 patches"));
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may fail by a panic, too")]
 
 use combwright::foam::{
+    complex::Shape,
     layers::{
         Arrangement, Division, LayerSettings, Layers, NoLayers, corner_angles, layer_figures, plane_end,
         relaxed, sheets, tetrahedral_angle,
@@ -10,6 +11,7 @@ use combwright::foam::{
     relax::{DescentStep, Ending},
     setup::FoamSpace,
 };
+use combwright::report::layers::picture;
 use std::ops::ControlFlow;
 
 /// Sixteen regular hexagons a layer.
@@ -30,12 +32,23 @@ fn made(
     cells: usize,
     fineness: usize,
 ) -> Result<Layers, NoLayers> {
+    made_while(space, arrangement, cells, fineness, ControlFlow::Continue(()))
+}
+
+/// `flow` is what the observer answers after each step.
+fn made_while(
+    space: &FoamSpace,
+    arrangement: Arrangement,
+    cells: usize,
+    fineness: usize,
+    flow: ControlFlow<()>,
+) -> Result<Layers, NoLayers> {
     let gap = space.gap().unwrap();
     let sheets = sheets(space, &gap, arrangement, cells, 1, &mut |_| ControlFlow::Continue(()))?;
     let domain = space.domain().unwrap();
     let division = Division::new(&gap, &domain, &sheets)?;
     let settings = LayerSettings { fineness, ..LayerSettings::new(arrangement, sheets.spacing) };
-    relaxed(division, &gap, &settings, &mut |_: &DescentStep<'_>| ControlFlow::Continue(()))
+    relaxed(division, &gap, &settings, &mut |_: &DescentStep<'_>| flow)
 }
 
 /// The energy of plane films: side films of half the height in either layer, and the ends by their formula.
@@ -112,6 +125,18 @@ fn layers_annealed_for_themselves_come_to_balance() -> Result<(), NoLayers> {
     // Both named arrangements are foams of the same cells; annealed ones may lie above them, but not far.
     let best = flat(Arrangement::Toth, 1)?.energy;
     assert!((best * 0.9999..best * 1.02).contains(&layers.energy), "{} {best}", layers.energy);
+    Ok(())
+}
+
+#[test]
+fn a_foam_that_is_stopped_on_its_first_films_can_be_drawn() -> Result<(), NoLayers> {
+    let layers = made_while(&space(), Arrangement::Annealed, CELLS, 1, ControlFlow::Break(()))?;
+    assert_eq!(layers.descended.ending, Ending::Halted);
+    // The first films are triangles; those of a foam in balance are quadrilaterals.
+    let shapes = layers.films.complex.films.iter().flat_map(|film| &film.elements);
+    assert!(shapes.map(|element| element.shape).all(|shape| shape == Shape::Tri6));
+    let figures = layer_figures(&layers.division);
+    assert!(picture(&layers, &figures, &space().gap().unwrap(), "stopped").is_ok());
     Ok(())
 }
 

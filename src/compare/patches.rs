@@ -2,9 +2,10 @@
 
 use super::{
     Sample, Units,
+    links::Links,
     tally::{Tally, tallies},
 };
-use crate::tessellation::{CellId, CellPattern};
+use crate::tessellation::{CellId, CellPattern, defects};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -12,14 +13,12 @@ use std::collections::BTreeMap;
 /// allows p < 0.05.
 pub(super) const LEAST_PATTERNS: usize = 4;
 
-/// Patches that the smaller group is divided into where it has cells enough: more of them make intervals steadier, larger
-/// ones lose fewer links between neighbours. With seven in each group there are 3432 divisions. With ten, a tenth of the true
-/// nulls of 100 cells with 5–7 pairs are rejected.
-const PATCHES: usize = 7;
+/// Patches that the smaller group is divided into where it has cells enough. With eight in each group there are 12 870
+/// divisions; the larger the patches, the fewer links between neighbours are left to be made up for.
+const PATCHES: usize = 8;
 
-/// The smallest patches: a cell with all its neighbours, and some. Below this the two halves of a 5–7 pair fall into
-/// different patches too often.
-const LEAST_CELLS: usize = 12;
+/// The smallest patches: a cell with all its neighbours, and one.
+const LEAST_CELLS: usize = 8;
 
 /// The largest: beyond this more patches are worth more.
 const MOST_CELLS: usize = 100;
@@ -32,6 +31,8 @@ pub(super) struct Divided {
     pub(super) comb: Vec<Tally>,
     /// The tally of each unit of foam.
     pub(super) foam: Vec<Tally>,
+    /// The cells of both and what links them.
+    pub(super) links: Links,
 }
 
 /// Divides both groups. Units without complete cells are left out.
@@ -41,23 +42,23 @@ pub(super) fn divide(comb: &[Sample], foam: &[Sample], units: Units) -> Divided 
     let complete = |samples: &[Sample]| samples.iter().map(|s| s.pattern.complete().count()).sum::<usize>();
     let smaller = complete(comb).min(complete(foam));
     let size = (smaller / PATCHES).clamp(LEAST_CELLS, MOST_CELLS);
-    let divided = |samples: &[Sample]| -> Vec<Tally> {
+    let mut links = Links::default();
+    let mut divided = |samples: &[Sample]| -> Vec<Tally> {
         let parts = |pattern: &CellPattern| match whole {
             true => 1,
             // To the nearest: patches of comb and foam come out of about one size.
             false => ((pattern.complete().count() + size / 2) / size).max(1),
         };
-        let all = samples.iter().flat_map(|sample| pattern_units(&sample.pattern, parts(&sample.pattern)));
+        let all = samples
+            .iter()
+            .flat_map(|sample| pattern_units(&sample.pattern, parts(&sample.pattern), &mut links));
         all.filter(|tally| tally.cells() > 0.0).collect()
     };
-    Divided {
-        units: if whole { Units::Patterns } else { Units::Patches },
-        comb: divided(comb),
-        foam: divided(foam),
-    }
+    let [comb, foam] = [divided(comb), divided(foam)];
+    Divided { units: if whole { Units::Patterns } else { Units::Patches }, comb, foam, links }
 }
 
-fn pattern_units(pattern: &CellPattern, parts: usize) -> Vec<Tally> {
+fn pattern_units(pattern: &CellPattern, parts: usize, links: &mut Links) -> Vec<Tally> {
     let mut cells: Vec<(CellId, DVec3)> = pattern.complete().map(|(id, cell)| (id, cell.position)).collect();
     let mut unit_of = BTreeMap::new();
     let mut next = 0;
@@ -65,7 +66,9 @@ fn pattern_units(pattern: &CellPattern, parts: usize) -> Vec<Tally> {
         unit_of.extend(patch.iter().map(|(id, _)| (*id, next)));
         next += 1;
     });
-    tallies(pattern, &unit_of, next)
+    let found = defects(pattern);
+    links.add(pattern, &found, &unit_of);
+    tallies(pattern, &found, &unit_of, next)
 }
 
 /// Halves the cells across their longest extent until there are `parts` patches, whose sizes differ by one at most from level
@@ -100,12 +103,12 @@ mod tests {
     #[test]
     fn patches_hold_all_cells_in_nearly_equal_numbers() -> Result<(), String> {
         let (small, large) = (sample(16, 10)?, sample(30, 20)?);
-        let Divided { units, comb, foam } = divide(&[small], &[large], Units::Auto);
+        let Divided { units, comb, foam, .. } = divide(&[small], &[large], Units::Auto);
         assert_eq!(units, Units::Patches);
-        assert_eq!((comb.len(), foam.len()), (7, 27));
+        assert_eq!((comb.len(), foam.len()), (8, 30));
         assert!((Tally::sum(&foam).cells() - 600.0).abs() < 1e-9);
         for tally in comb.iter().chain(&foam) {
-            assert!((20.0..=26.0).contains(&tally.cells()), "{}", tally.cells());
+            assert!((17.0..=23.0).contains(&tally.cells()), "{}", tally.cells());
         }
         Ok(())
     }

@@ -19,33 +19,36 @@ pub(super) struct Permuted {
     pub(super) exhaustive: bool,
 }
 
-/// Compares the statistics of the division given, the first `first` units against the rest, with those of all divisions into
-/// groups of the same sizes, or of `draws` random ones. Larger is more extreme; a statistic that is none counts as extreme.
+/// A statistic of two groups as it is, and as it would be if units kept all their links.
+pub(super) struct Statistic {
+    pub(super) plain: Option<f64>,
+    pub(super) linked: Option<f64>,
+}
+
+/// Compares the statistics of the first `first` units against the rest with those of all divisions into groups of the same
+/// sizes, or of `draws` random ones and the one observed. Larger is more extreme; a statistic that is none counts as extreme.
+/// A division with just the value observed counts as well, whatever its links make of it.
 pub(super) fn permute(
     units: &[Tally],
     first: usize,
     draws: usize,
     seed: u64,
-    statistics: impl Fn(&Tally, &Tally) -> Vec<Option<f64>>,
+    statistics: impl Fn(&Tally, &Tally) -> Vec<Statistic>,
 ) -> Permuted {
     let total = Tally::sum(units);
     let evaluate = |chosen: &[usize]| {
         let one = Tally::sum(chosen.iter().map(|unit| &units[*unit]));
         statistics(&one, &total.minus(&one))
     };
-    let observed = evaluate(&(0..first).collect::<Vec<_>>());
+    let mut chosen: Vec<usize> = (0..first).collect();
+    let observed = evaluate(&chosen);
     let mut count = Counter::new(&observed);
     let exhaustive = binomial(units.len(), first) <= EXHAUSTIBLE;
     if exhaustive {
-        let mut chosen: Vec<usize> = (0..first).collect();
-        loop {
+        while next_combination(&mut chosen, units.len()) {
             count.add(&evaluate(&chosen));
-            if !next_combination(&mut chosen, units.len()) {
-                break;
-            }
         }
     } else {
-        count.add(&observed);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut order: Vec<usize> = (0..units.len()).collect();
         for _ in 0..draws {
@@ -57,35 +60,40 @@ pub(super) fn permute(
 }
 
 struct Counter<'a> {
-    observed: &'a [Option<f64>],
+    observed: &'a [Statistic],
     extreme: Vec<usize>,
     sums: Vec<f64>,
     divisions: usize,
 }
 
 impl<'a> Counter<'a> {
-    fn new(observed: &'a [Option<f64>]) -> Self {
-        Self { observed, extreme: vec![0; observed.len()], sums: vec![0.0; observed.len()], divisions: 0 }
+    /// The division observed is the first and as extreme as itself.
+    fn new(observed: &'a [Statistic]) -> Self {
+        let sums = observed.iter().map(|statistic| statistic.linked.unwrap_or(0.0)).collect();
+        Self { observed, extreme: vec![1; observed.len()], sums, divisions: 1 }
     }
 
-    fn add(&mut self, values: &[Option<f64>]) {
+    fn add(&mut self, values: &[Statistic]) {
         self.divisions += 1;
         for (at, (value, observed)) in values.iter().zip(self.observed).enumerate() {
-            // Sums in another order differ in their last digits.
-            let reached = match (value, observed) {
-                (Some(value), Some(observed)) => *value >= observed - 1e-9 * (1.0 + observed.abs()),
+            let reached = match (value.plain, value.linked, observed.plain) {
+                // Sums in another order differ in their last digits.
+                (Some(plain), Some(linked), Some(observed)) => {
+                    let least = 1e-9 * (1.0 + observed.abs());
+                    linked >= observed - least || (plain - observed).abs() <= least
+                }
                 _ => true,
             };
             self.extreme[at] += usize::from(reached);
-            self.sums[at] += value.unwrap_or(0.0);
+            self.sums[at] += value.linked.unwrap_or(0.0);
         }
     }
 
     fn finish(self, exhaustive: bool) -> Permuted {
-        let share = |count: usize| count as f64 / self.divisions as f64;
+        let divisions = self.divisions as f64;
         Permuted {
-            p: self.extreme.iter().map(|count| share(*count)).collect(),
-            mean: self.sums.iter().map(|sum| sum / self.divisions as f64).collect(),
+            p: self.extreme.iter().map(|count| *count as f64 / divisions).collect(),
+            mean: self.sums.iter().map(|sum| sum / divisions).collect(),
             divisions: self.divisions,
             exhaustive,
         }
@@ -127,8 +135,9 @@ mod tests {
         counts.iter().map(unit).collect()
     }
 
-    fn difference(one: &Tally, two: &Tally) -> Vec<Option<f64>> {
-        vec![one.share(5).zip(two.share(5)).map(|(a, b)| (a - b).abs())]
+    fn difference(one: &Tally, two: &Tally) -> Vec<Statistic> {
+        let value = one.share(5).zip(two.share(5)).map(|(a, b)| (a - b).abs());
+        vec![Statistic { plain: value, linked: value }]
     }
 
     #[test]

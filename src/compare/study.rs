@@ -4,8 +4,9 @@ use super::{
     COMPARISON_SCHEMA, CompareError, Comparison, Estimate, Figure, FigureTest, Group, LeftOut,
     PatternFigures, Sample, Settings, SideClass, SidesTest, Units,
     bootstrap::{interval, resampled},
+    links::Links,
     patches::{Divided, LEAST_PATTERNS, divide},
-    permutation::permute,
+    permutation::{Statistic, permute},
     tally::{CLASSES, Tally},
     verdict,
 };
@@ -32,7 +33,8 @@ pub fn compare(comb: &[Sample], foam: &[Sample], settings: &Settings) -> Result<
         .filter(|figure| *figure != Figure::ChargeOverCurvature || has_curvature(comb, foam))
         .collect();
     let (sides, tests) = study.tests(&figures);
-    let groups = [group("comb", comb, &divided.comb), group("foam", foam, &divided.foam)];
+    let links = divided.links.widening(|cell| f64::from(u8::from(cell.class == 6)));
+    let groups = [group("comb", comb, &divided.comb, links), group("foam", foam, &divided.foam, links)];
     let verdict = verdict::verdict(&groups, divided.units, &sides);
     let [comb_group, foam_group] = groups;
     Ok(Comparison {
@@ -100,107 +102,172 @@ impl Study<'_> {
     fn tests(&self, figures: &[Figure]) -> (SidesTest, Vec<FigureTest>) {
         let units: Vec<Tally> = self.divided.comb.iter().chain(&self.divided.foam).copied().collect();
         let bins = bins(&self.sums);
-        let first = self.divided.comb.len();
-        let permuted = permute(&units, first, self.settings.permutations, self.settings.seed, |one, two| {
-            let mut values = vec![Some(chi_square(&bins, one, two)), Some(total_variation(one, two))];
-            values.extend(
-                figures.iter().map(|figure| figure.of(one).zip(figure.of(two)).map(|(a, b)| (a - b).abs())),
-            );
-            values
+        let shuffled = Widening::of(&self.divided.links, &bins, figures);
+        let plain = Widening::none(&bins, figures);
+        let Settings { permutations, seed, .. } = *self.settings;
+        let permuted = permute(&units, self.divided.comb.len(), permutations, seed, |one, two| {
+            let of = |widening| statistics(&bins, figures, widening, one, two);
+            let pairs = of(&plain).into_iter().zip(of(&shuffled));
+            pairs.map(|(plain, linked)| Statistic { plain, linked }).collect()
         });
         let [comb, foam] = &self.sums;
-        let chi_square = chi_square(&bins, comb, foam);
+        let chi_square = chi_square(&bins, &plain.bins, comb, foam);
         let sides = SidesTest {
-            classes: self.classes(),
+            classes: self.classes(&shuffled),
             chi_square,
             p: permuted.p[0],
             permutations: permuted.divisions,
             exhaustive: permuted.exhaustive,
-            total_variation: total_variation(comb, foam),
+            total_variation: total_variation(&plain.classes, comb, foam),
             total_variation_by_chance: permuted.mean[1],
             cohens_w: (chi_square / (comb.cells() + foam.cells())).sqrt(),
         };
-        (sides, self.figure_tests(figures, &permuted.p[2..]))
+        (sides, self.figure_tests(figures, &permuted.p[2..], &shuffled))
     }
 
     /// Each number of sides that occurs.
-    fn classes(&self) -> Vec<SideClass> {
+    fn classes(&self, widening: &Widening) -> Vec<SideClass> {
         let occurs = |class: &usize| self.sums.iter().any(|sum| sum.by_sides[*class] > 0.0);
         let class = |sides: usize| {
-            let (share, difference) = self.estimates(|tally| tally.share(sides));
+            let (share, difference) = self.estimates(widening.classes[sides], |tally| tally.share(sides));
             SideClass { sides, cells: self.sums.map(|sum| whole(sum.by_sides[sides])), share, difference }
         };
         (0..CLASSES).filter(occurs).map(class).collect()
     }
 
-    fn figure_tests(&self, figures: &[Figure], p: &[f64]) -> Vec<FigureTest> {
+    fn figure_tests(&self, figures: &[Figure], p: &[f64], widening: &Widening) -> Vec<FigureTest> {
         let corrected = holm(p);
         let test = |(at, figure): (usize, &Figure)| {
-            let (value, difference) = self.estimates(|tally| figure.of(tally));
+            let (value, difference) = self.estimates(widening.figures[at], |tally| figure.of(tally));
             FigureTest { figure: *figure, value, difference, p: p[at], p_holm: corrected[at] }
         };
         figures.iter().enumerate().map(test).collect()
     }
 
-    /// A figure in comb and foam, and its difference, with intervals.
-    fn estimates(&self, figure: impl Fn(&Tally) -> Option<f64>) -> ([Estimate; 2], Estimate) {
+    /// A figure in comb and foam, and its difference, with intervals that are widened by a factor.
+    fn estimates(&self, widening: f64, figure: impl Fn(&Tally) -> Option<f64>) -> ([Estimate; 2], Estimate) {
         let counts = [self.divided.comb.len(), self.divided.foam.len()];
         let value = self.sums.each_ref().map(|sum| figure(sum).unwrap_or(f64::NAN));
-        let one = |at: usize| Estimate {
-            value: value[at],
-            interval: interval(self.resamples[at].iter().filter_map(&figure).collect(), counts[at]),
+        let estimate = |value: f64, resampled: Vec<f64>, units: usize| Estimate {
+            value,
+            interval: interval(resampled, units).map(|ends| ends.map(|end| value + widening * (end - value))),
+        };
+        let one = |at: usize| {
+            estimate(value[at], self.resamples[at].iter().filter_map(&figure).collect(), counts[at])
         };
         let [comb, foam] = &self.resamples;
         let differences = comb.iter().zip(foam).filter_map(|(a, b)| Some(figure(a)? - figure(b)?));
-        let difference = Estimate {
-            value: value[0] - value[1],
-            interval: interval(differences.collect(), counts[0].min(counts[1])),
-        };
+        let difference = estimate(value[0] - value[1], differences.collect(), counts[0].min(counts[1]));
         ([one(0), one(1)], difference)
     }
 }
 
+/// By which factors the differences of shuffled units are widened for the links that units lose.
+struct Widening {
+    bins: Vec<f64>,
+    classes: [f64; CLASSES],
+    figures: Vec<f64>,
+}
+
+impl Widening {
+    fn of(links: &Links, bins: &[Vec<usize>], figures: &[Figure]) -> Self {
+        let within =
+            |classes: &[usize]| links.widening(|cell| f64::from(u8::from(classes.contains(&cell.class))));
+        Self {
+            bins: bins.iter().map(|bin| within(bin)).collect(),
+            classes: std::array::from_fn(|class| within(&[class])),
+            figures: figures.iter().map(|figure| figure.widening(links)).collect(),
+        }
+    }
+
+    fn none(bins: &[Vec<usize>], figures: &[Figure]) -> Self {
+        Self { bins: vec![1.0; bins.len()], classes: [1.0; CLASSES], figures: vec![1.0; figures.len()] }
+    }
+}
+
+/// What is compared between two groups: the chi-square distance, the total variation, and the size of each figure's
+/// difference.
+fn statistics(
+    bins: &[Vec<usize>],
+    figures: &[Figure],
+    widening: &Widening,
+    one: &Tally,
+    two: &Tally,
+) -> Vec<Option<f64>> {
+    let mut values = vec![
+        Some(chi_square(bins, &widening.bins, one, two)),
+        Some(total_variation(&widening.classes, one, two)),
+    ];
+    let differences = figures.iter().zip(&widening.figures).map(|(figure, widening)| {
+        let (a, b) = figure.of(one).zip(figure.of(two))?;
+        Some((a - b).abs() * widening)
+    });
+    values.extend(differences);
+    values
+}
+
 /// Numbers of sides taken together from both ends, until each class of the pooled cells is expected often enough in the
-/// smaller group. The classes follow from the pooled counts alone, so that all divisions are judged by the same ones.
+/// smaller group. Hexagons stay by themselves; where fewer or more than six sides are too rare, all that are no hexagons are
+/// one class. The classes follow from the pooled counts alone, so that all divisions are judged by the same ones.
 fn bins(sums: &[Tally; 2]) -> Vec<Vec<usize>> {
     let pooled = sums[0].plus(&sums[1]);
     let smaller = sums[0].cells().min(sums[1].cells()) / pooled.cells();
-    let expected = |bin: &[usize]| bin.iter().map(|class| pooled.by_sides[*class]).sum::<f64>() * smaller;
-    let mut bins: Vec<Vec<usize>> = (0..CLASSES).map(|class| vec![class]).collect();
-    while bins.len() > 1 && expected(&bins[0]) < LEAST_EXPECTED {
-        let first = bins.remove(0);
-        bins[0].extend(first);
+    let rare = |bin: &[usize]| {
+        bin.iter().map(|class| pooled.by_sides[*class]).sum::<f64>() * smaller < LEAST_EXPECTED
+    };
+    let [mut fewer, mut more] = [(0..6).collect::<Vec<usize>>(), (7..CLASSES).rev().collect()]
+        .map(|outermost_first| gathered(outermost_first, &rare));
+    if fewer.iter().chain(&more).any(|bin| rare(bin)) {
+        let others = fewer.drain(..).chain(more.drain(..)).flatten().collect();
+        fewer.push(others);
     }
-    while bins.len() > 1 && expected(&bins[bins.len() - 1]) < LEAST_EXPECTED {
-        let last = bins.pop().unwrap_or_default();
-        if let Some(bin) = bins.last_mut() {
-            bin.extend(last);
+    fewer.push(vec![6]);
+    fewer.extend(more);
+    fewer
+}
+
+/// Classes put together in their order until none is rare but perhaps the only one.
+fn gathered(classes: Vec<usize>, rare: &impl Fn(&[usize]) -> bool) -> Vec<Vec<usize>> {
+    let mut bins: Vec<Vec<usize>> = Vec::new();
+    for class in classes {
+        match bins.last_mut() {
+            Some(last) if rare(last) => last.push(class),
+            _ => bins.push(vec![class]),
+        }
+    }
+    if let Some(last) = bins.pop_if(|last| rare(last)) {
+        match bins.last_mut() {
+            Some(before) => before.extend(last),
+            None => bins.push(last),
         }
     }
     bins
 }
 
-/// The chi-square distance of two distributions over bins.
-fn chi_square(bins: &[Vec<usize>], one: &Tally, two: &Tally) -> f64 {
+/// The chi-square distance of two distributions over bins, the difference in each widened by a factor.
+fn chi_square(bins: &[Vec<usize>], widening: &[f64], one: &Tally, two: &Tally) -> f64 {
     let [first, second] = [one.cells(), two.cells()];
     let total = first + second;
-    let term = |bin: &Vec<usize>| {
+    let term = |(bin, widening): (&Vec<usize>, &f64)| {
         let count = |tally: &Tally| bin.iter().map(|class| tally.by_sides[*class]).sum::<f64>();
         let [a, b] = [count(one), count(two)];
         let pooled = (a + b) / total;
         if pooled > 0.0 {
-            (a - first * pooled).powi(2) / (first * pooled)
-                + (b - second * pooled).powi(2) / (second * pooled)
+            widening.powi(2)
+                * ((a - first * pooled).powi(2) / (first * pooled)
+                    + (b - second * pooled).powi(2) / (second * pooled))
         } else {
             0.0
         }
     };
-    bins.iter().map(term).sum()
+    bins.iter().zip(widening).map(term).sum()
 }
 
-fn total_variation(one: &Tally, two: &Tally) -> f64 {
+fn total_variation(widening: &[f64; CLASSES], one: &Tally, two: &Tally) -> f64 {
     let share = |tally: &Tally, class| tally.share(class).unwrap_or(0.0);
-    0.5 * (0..CLASSES).map(|class| (share(one, class) - share(two, class)).abs()).sum::<f64>()
+    0.5 * (0..CLASSES)
+        .map(|class| widening[class] * (share(one, class) - share(two, class)).abs())
+        .sum::<f64>()
 }
 
 /// Holm's correction: the least p times the number of tests, the next times one less, and so on, never descending.
@@ -216,7 +283,8 @@ fn holm(p: &[f64]) -> Vec<f64> {
     corrected
 }
 
-fn group(kind: &'static str, samples: &[Sample], units: &[Tally]) -> Group {
+/// `links` is the factor by which differences of hexagons widen with the links between units.
+fn group(kind: &'static str, samples: &[Sample], units: &[Tally], links: f64) -> Group {
     let cells = Tally::sum(units).cells();
     Group {
         kind,
@@ -231,7 +299,7 @@ fn group(kind: &'static str, samples: &[Sample], units: &[Tally]) -> Group {
         cells: whole(cells),
         units: units.len(),
         cells_per_unit: cells / units.len() as f64,
-        design_effect: design_effect(units),
+        design_effect: design_effect(units).map(|effect| effect * links * links),
     }
 }
 
@@ -336,8 +404,8 @@ mod tests {
         let (one, two) = (tally(10.0, 30.0), tally(20.0, 20.0));
         let bins = bins(&[one, two]);
         assert_eq!(bins.len(), 2);
-        assert!((chi_square(&bins, &one, &two) - (50.0 / 15.0 + 2.0)).abs() < 1e-12);
-        assert!((total_variation(&one, &two) - 0.25).abs() < 1e-12);
+        assert!((chi_square(&bins, &[1.0; 2], &one, &two) - (50.0 / 15.0 + 2.0)).abs() < 1e-12);
+        assert!((total_variation(&[1.0; CLASSES], &one, &two) - 0.25).abs() < 1e-12);
     }
 
     #[test]

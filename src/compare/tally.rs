@@ -1,6 +1,7 @@
 //! What is counted in a unit, and the figures that follow from counts.
 
-use crate::tessellation::{CellId, CellPattern, defects};
+use super::links::Links;
+use crate::tessellation::{CellId, CellPattern, Defects};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -138,10 +139,28 @@ impl Figure {
             }
         }
     }
+
+    /// By which factor its differences between shuffled units are widened for the links that units lose. A chain is never
+    /// divided; of the charges over curvature no covariance is taken.
+    pub(super) fn widening(self, links: &Links) -> f64 {
+        let if_so = |so: bool| f64::from(u8::from(so));
+        match self {
+            Self::DefectDensity => links.widening(|cell| if_so(cell.class != 6)),
+            Self::PairDensity => links.widening(|cell| if_so(cell.leads_pair)),
+            Self::MeanSides => links.widening(|cell| cell.class as f64),
+            Self::SecondMoment => links.widening(|cell| (cell.class as f64 - 6.0).powi(2)),
+            Self::ChainLength | Self::ChargeOverCurvature => 1.0,
+        }
+    }
 }
 
 /// The tally of each unit of a pattern; `unit_of` says which unit each complete cell belongs to.
-pub(super) fn tallies(pattern: &CellPattern, unit_of: &BTreeMap<CellId, usize>, units: usize) -> Vec<Tally> {
+pub(super) fn tallies(
+    pattern: &CellPattern,
+    found: &Defects,
+    unit_of: &BTreeMap<CellId, usize>,
+    units: usize,
+) -> Vec<Tally> {
     let mut tallies = vec![Tally::default(); units];
     for (id, cell) in pattern.complete() {
         let (Some(sides), Some(unit)) = (cell.sides, unit_of.get(&id)) else { continue };
@@ -153,7 +172,6 @@ pub(super) fn tallies(pattern: &CellPattern, unit_of: &BTreeMap<CellId, usize>, 
             tally.curvature_square += integral * integral;
         }
     }
-    let found = defects(pattern);
     for pair in &found.pairs {
         if let Some(unit) = unit_of.get(&pair.few) {
             tallies[*unit].pairs += 1.0;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Fewest units of each kind for a verdict: 4 and 4 can be divided in 35 ways, which allows p < 0.05.
 pub(super) const LEAST_UNITS: usize = 4;
 
-/// Fewest complete cells of each kind: four patches of a dozen.
+/// Fewest complete cells of each kind: half a dozen of the smallest patches.
 pub(super) const LEAST_CELLS: usize = 48;
 
 /// The difference in the share of hexagons that a study should be able to see.

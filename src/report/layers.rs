@@ -141,13 +141,11 @@ fn panel(layers: &Layers, figures: &LayerFigures, layer: usize, gap: &Gap, size:
     canvas
 }
 
-/// A film's biquadratic elements as triangles between their nodes.
+/// A film's elements as triangles between their nodes.
 fn facets<'a>(layers: &'a Layers, film: &'a Film) -> impl Iterator<Item = [DVec3; 3]> + 'a {
     film.elements.iter().flat_map(move |element| {
         let place = move |at: usize| layers.place(element.nodes[at]);
-        [0, 1, 3, 4].into_iter().flat_map(move |at| {
-            [[at, at + 1, at + 4], [at, at + 4, at + 3]].map(|corners| corners.map(place))
-        })
+        element.shape.triangles().iter().map(move |corners| corners.map(place))
     })
 }
 

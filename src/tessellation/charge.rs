@@ -9,7 +9,7 @@
 //! it on the whole of a closed surface (Gauss–Bonnet; M. Bowick, D. Nelson and A. Travesset, Phys. Rev. B 62, 2000).
 
 use super::{
-    neighbours::within,
+    neighbours::cells_within,
     pattern::{CellId, CellPattern, CellStatus, Surroundings},
 };
 use serde::{Deserialize, Serialize};
@@ -164,7 +164,7 @@ pub fn charge_against_curvature(pattern: &CellPattern, reach: usize) -> Option<V
         let mut regions = Vec::new();
         let mut cells = 0;
         for id in &middles {
-            let region = within(pattern, *id, radius);
+            let region = cells_within(pattern, *id, radius);
             let figures: Option<Vec<[f64; 2]>> = region.iter().map(|(other, _)| known(*other)).collect();
             if let Some(figures) = figures {
                 cells += region.len();

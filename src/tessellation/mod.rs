@@ -31,7 +31,8 @@ pub use charge::{ChargeBalance, RegionCharges, charge_against_curvature, charge_
 pub use defects::{Chain, Defects, Pair, defects};
 pub use flips::flipped_hexagons;
 pub use neighbours::{
-    AboavWeaire, AreaMean, DistanceCorrelation, Lewis, NeighbourMean, aboav_weaire, lewis, side_correlations,
+    AboavWeaire, AreaMean, DistanceCorrelation, Lewis, NeighbourMean, aboav_weaire, cells_within, lewis,
+    side_correlations,
 };
 pub use pattern::{
     Cell, CellId, CellPattern, CellStatus, CellWall, PATTERN_SCHEMA, PatternDefect, Surroundings,

@@ -159,7 +159,7 @@ pub fn side_correlations(pattern: &CellPattern, reach: usize) -> Vec<DistanceCor
     };
     let mut sums = vec![(0_usize, 0.0); reach + 1];
     for (id, n) in counted(pattern) {
-        for (other, distance) in within(pattern, id, reach) {
+        for (other, distance) in cells_within(pattern, id, reach) {
             let complete = pattern.cells[other].status == CellStatus::Complete;
             if let Some(m) = pattern.cells[other].sides.filter(|_| complete) {
                 sums[distance].0 += 1;
@@ -179,7 +179,8 @@ pub fn side_correlations(pattern: &CellPattern, reach: usize) -> Vec<DistanceCor
 }
 
 /// The cells at most `reach` walls from a cell, itself included, with their distances; nearest first.
-pub(super) fn within(pattern: &CellPattern, start: CellId, reach: usize) -> Vec<(CellId, usize)> {
+#[must_use]
+pub fn cells_within(pattern: &CellPattern, start: CellId, reach: usize) -> Vec<(CellId, usize)> {
     let mut seen: IndexVec<CellId, bool> = IndexVec::from_elem(false, pattern.cells.len());
     seen[start] = true;
     let mut found = vec![(start, 0)];

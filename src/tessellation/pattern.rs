@@ -97,7 +97,7 @@ pub enum PatternDefect {
         found: String,
     },
     /// A number that is not finite, or a confidence outside 0 to 1, or a negative length.
-    #[error("cell {cell:?}: the {what} is {value}")]
+    #[error("cell {cell}: the {what} is {value}")]
     Number {
         /// The cell.
         cell: CellId,
@@ -107,7 +107,7 @@ pub enum PatternDefect {
         value: f64,
     },
     /// A neighbour that does not exist.
-    #[error("cell {cell:?} names the neighbour {neighbour:?}, but there are only {cells} cells")]
+    #[error("cell {cell} names the neighbour {neighbour}, but there are only {cells} cells")]
     NoSuchCell {
         /// The cell.
         cell: CellId,
@@ -117,9 +117,7 @@ pub enum PatternDefect {
         cells: usize,
     },
     /// A wall that is not seen from the other side.
-    #[error(
-        "cell {cell:?} touches {neighbour:?} across {times} walls, but {neighbour:?} touches it across {back}"
-    )]
+    #[error("cell {cell} touches {neighbour} across {times} walls, but {neighbour} touches it across {back}")]
     OneSided {
         /// The cell.
         cell: CellId,
@@ -131,7 +129,7 @@ pub enum PatternDefect {
         back: usize,
     },
     /// A complete cell without a number of sides, or with one that differs from its walls while it claims certainty.
-    #[error("cell {cell:?} is complete, but its number of sides is missing")]
+    #[error("cell {cell} is complete, but its number of sides is missing")]
     NoSides {
         /// The cell.
         cell: CellId,

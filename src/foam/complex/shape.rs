@@ -113,6 +113,18 @@ impl Shape {
         }
     }
 
+    /// Plane triangles between the nodes, counter-clockwise, as pictures show the element.
+    #[must_use]
+    pub fn triangles(self) -> &'static [[usize; 3]] {
+        match self {
+            Self::Quad9 => {
+                &[[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [3, 4, 7], [3, 7, 6], [4, 5, 8], [4, 8, 7]]
+            }
+            Self::Tri6 => &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+            Self::Tri3 => &[[0, 1, 2]],
+        }
+    }
+
     /// The place `(u, v)` of a node.
     #[must_use]
     pub(crate) fn node_at(self, node: usize) -> (f64, f64) {
@@ -210,8 +222,24 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec2;
 
     const SHAPES: [Shape; 3] = [Shape::Quad9, Shape::Tri6, Shape::Tri3];
+
+    #[test]
+    fn triangles_between_nodes_cover_the_element_once() {
+        for (shape, area) in SHAPES.into_iter().zip([1.0, 0.5, 0.5]) {
+            let place = |node: usize| DVec2::from(shape.node_at(node));
+            let areas = shape.triangles().iter().map(|corners| {
+                let [a, b, c] = corners.map(place);
+                0.5 * (b - a).perp_dot(c - a)
+            });
+            let areas: Vec<f64> = areas.collect();
+            assert!(areas.iter().all(|a| *a > 0.0), "{shape:?}: {areas:?}");
+            // The areas are dyadic fractions: nothing is rounded.
+            assert!((areas.iter().sum::<f64>() - area).abs() < 1e-15, "{shape:?}");
+        }
+    }
 
     #[test]
     fn gauss_points_integrate_polynomials_of_twice_their_number() {

@@ -8,13 +8,13 @@ use glam::{DVec3, IVec3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FlipRefusal {
     /// A cell beside the edge would be left with two sides.
-    #[error("cell {0:?} beside the edge has only three sides")]
+    #[error("cell {0} beside the edge has only three sides")]
     Triangle(CellId),
     /// The cells at the ends touch already.
-    #[error("cells {0:?} and {1:?} at the ends touch already")]
+    #[error("cells {0} and {1} at the ends touch already")]
     TouchAlready(CellId, CellId),
     /// The same cell lies at both ends: it would touch itself.
-    #[error("cell {0:?} lies at both ends and would touch itself")]
+    #[error("cell {0} lies at both ends and would touch itself")]
     SameCell(CellId),
     /// The film ends at planes on both sides: the outside would touch itself.
     #[error("both ends of the film lie on planes that cut the foam off")]
@@ -25,7 +25,7 @@ pub enum FlipRefusal {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RemoveRefusal {
     /// Only triangles vanish: other cells lose sides by T1 first.
-    #[error("cell {cell:?} has {sides} sides; only a triangle can vanish")]
+    #[error("cell {cell} has {sides} sides; only a triangle can vanish")]
     NotTriangle {
         /// The cell.
         cell: CellId,
@@ -33,7 +33,7 @@ pub enum RemoveRefusal {
         sides: usize,
     },
     /// What would be left is no network.
-    #[error("without cell {cell:?} the rest is no network: {defects:?}")]
+    #[error("without cell {cell} the rest is no network: {defects:?}")]
     Defects {
         /// The cell.
         cell: CellId,

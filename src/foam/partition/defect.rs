@@ -14,27 +14,27 @@ const VOLUME_TOLERANCE: f64 = 2e-3;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PartitionDefect {
     /// Planes meet so closely that rounding decides what they leave.
-    #[error("cell {cell:?}: its bisecting planes meet too closely to be told apart; two seeds may coincide")]
+    #[error("cell {cell}: its bisecting planes meet too closely to be told apart; two seeds may coincide")]
     Degenerate {
         /// The cell.
         cell: CellId,
     },
     /// Walls and films cross in a way that cannot be resolved.
     #[error(
-        "cell {cell:?}: a wall crosses its films in a way that cannot be resolved; the gap is too wide or too curved for it"
+        "cell {cell}: a wall crosses its films in a way that cannot be resolved; the gap is too wide or too curved for it"
     )]
     Tangled {
         /// The cell.
         cell: CellId,
     },
     /// The cell does not end.
-    #[error("cell {cell:?} reaches across the whole domain: there are too few cells")]
+    #[error("cell {cell} reaches across the whole domain: there are too few cells")]
     Unbounded {
         /// The cell.
         cell: CellId,
     },
     /// The cell is not connected.
-    #[error("cell {cell:?} is in {pieces} pieces: there are too few cells for this surface")]
+    #[error("cell {cell} is in {pieces} pieces: there are too few cells for this surface")]
     Pieces {
         /// The cell.
         cell: CellId,
@@ -42,7 +42,7 @@ pub enum PartitionDefect {
         pieces: usize,
     },
     /// The cell does not reach from wall to wall, or meets a wall in several places.
-    #[error("cell {cell:?} meets the {} wall in {patches} patches instead of one: the gap is too wide for one layer of so many cells", name(*.wall))]
+    #[error("cell {cell} meets the {} wall in {patches} patches instead of one: the gap is too wide for one layer of so many cells", name(*.wall))]
     Patches {
         /// The cell.
         cell: CellId,
@@ -53,7 +53,7 @@ pub enum PartitionDefect {
     },
     /// The cell does not meet the middle surface in one loop.
     #[error(
-        "cell {cell:?} meets the middle surface in {loops} loops instead of one: there are too few cells for this surface"
+        "cell {cell} meets the middle surface in {loops} loops instead of one: there are too few cells for this surface"
     )]
     Sections {
         /// The cell.
@@ -63,7 +63,7 @@ pub enum PartitionDefect {
     },
     /// The volume came out undefined.
     #[error(
-        "cell {cell:?}: its patch on a wall is too strongly curved for its volume to be measured; there are too few cells"
+        "cell {cell}: its patch on a wall is too strongly curved for its volume to be measured; there are too few cells"
     )]
     Curved {
         /// The cell.
@@ -78,20 +78,20 @@ pub enum PartitionDefect {
         gap: f64,
     },
     /// The cell ends at two planes that face each other.
-    #[error("cell {cell:?} reaches from one cut plane to the one that faces it: there are too few cells")]
+    #[error("cell {cell} reaches from one cut plane to the one that faces it: there are too few cells")]
     Spans {
         /// The cell.
         cell: CellId,
     },
     /// The cell covers more than one corner of the domain.
-    #[error("cell {cell:?} covers two corners of the domain: there are too few cells")]
+    #[error("cell {cell} covers two corners of the domain: there are too few cells")]
     Corners {
         /// The cell.
         cell: CellId,
     },
     /// The lines in which planes cut the middle surface do not close.
     #[error(
-        "the cut beside cell {cell:?} closes in no line: it winds round the period, or one cell has all of it"
+        "the cut beside cell {cell} closes in no line: it winds round the period, or one cell has all of it"
     )]
     OpenRim {
         /// The cell.

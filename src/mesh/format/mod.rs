@@ -56,7 +56,7 @@ pub enum WriteError {
     Io(#[from] io::Error),
     /// A coordinate that single precision does not hold.
     #[error(
-        "vertex {vertex:?} at {place} mm is too far out for a mesh file (single precision ends at 3.4e38); use a smaller scale"
+        "vertex {vertex} at {place} mm is too far out for a mesh file (single precision ends at 3.4e38); use a smaller scale"
     )]
     OutOfRange {
         /// The vertex.

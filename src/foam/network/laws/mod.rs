@@ -15,7 +15,7 @@ use glam::IVec3;
 pub enum NetworkDefect {
     /// A cell with fewer than two corners (fewer than three, unless two vertices make up the whole foam).
     #[error(
-        "cell {cell:?} has {corners} corners; at least {least} are needed (too few cells for the surface, or a cell in several pieces)"
+        "cell {cell} has {corners} corners; at least {least} are needed (too few cells for the surface, or a cell in several pieces)"
     )]
     FewCorners {
         /// The cell.
@@ -26,7 +26,7 @@ pub enum NetworkDefect {
         least: usize,
     },
     /// A cell that passes the same image of a vertex twice.
-    #[error("cell {cell:?} passes vertex {vertex:?} twice: it pinches itself")]
+    #[error("cell {cell} passes vertex {vertex} twice: it pinches itself")]
     Pinched {
         /// The cell.
         cell: CellId,
@@ -34,7 +34,7 @@ pub enum NetworkDefect {
         vertex: VertexId,
     },
     /// A corner or neighbour that does not exist.
-    #[error("cell {cell:?} names {what} {number}, but there are only {count}")]
+    #[error("cell {cell} names {what} {number}, but there are only {count}")]
     NoSuch {
         /// The cell.
         cell: CellId,
@@ -56,7 +56,7 @@ pub enum NetworkDefect {
         position: glam::DVec3,
     },
     /// The same side listed twice.
-    #[error("the side from {from:?} to {to:?} of cell {cell:?} is listed twice")]
+    #[error("the side from {from} to {to} of cell {cell} is listed twice")]
     SideTwice {
         /// The cell.
         cell: CellId,
@@ -67,7 +67,7 @@ pub enum NetworkDefect {
     },
     /// A side that the neighbour does not have.
     #[error(
-        "cell {cell:?} has a side from {from:?} to {to:?} with {neighbour:?} behind it, but {neighbour:?} has no such side"
+        "cell {cell} has a side from {from} to {to} with {neighbour} behind it, but {neighbour} has no such side"
     )]
     Unpaired {
         /// The cell.
@@ -80,7 +80,7 @@ pub enum NetworkDefect {
         to: VertexId,
     },
     /// A half-edge whose links contradict its twin's or its neighbours'.
-    #[error("half-edge {side:?}: {what}")]
+    #[error("half-edge {side}: {what}")]
     Links {
         /// The half-edge.
         side: HalfEdgeId,
@@ -88,7 +88,7 @@ pub enum NetworkDefect {
         what: &'static str,
     },
     /// A vertex where not three sides meet.
-    #[error("{valence} edges meet at vertex {vertex:?}, not 3")]
+    #[error("{valence} edges meet at vertex {vertex}, not 3")]
     Valence {
         /// The vertex.
         vertex: VertexId,
@@ -120,7 +120,7 @@ pub enum NetworkDefect {
         cells: usize,
     },
     /// A cell that touches itself, directly or round the period.
-    #[error("cell {cell:?} touches itself {shift} periods away: too few cells for the period")]
+    #[error("cell {cell} touches itself {shift} periods away: too few cells for the period")]
     TouchesItself {
         /// The cell.
         cell: CellId,
