@@ -76,16 +76,23 @@ impl Share {
     }
 }
 
+/// Where a Newton step starts, and what it may move.
+#[derive(Clone, Copy)]
+pub(crate) struct Start<'a> {
+    pub(crate) problem: &'a Problem,
+    pub(crate) surface: &'a Surface,
+    pub(crate) neighbours: &'a Neighbours,
+    pub(crate) state: &'a State,
+    pub(crate) multipliers: &'a IndexVec<FunctionalId, f64>,
+    /// Whether vertices move along the normals of the films only.
+    pub(crate) normal: bool,
+    /// Motions to which steps are at right angles.
+    pub(crate) still: &'a [Velocity],
+}
+
 impl Assembled {
-    /// `normal` restricts vertices to the normals of the films; steps are at right angles to the motions in `still`.
-    pub(super) fn new(
-        problem: &Problem,
-        (surface, neighbours): (&Surface, &Neighbours),
-        state: &State,
-        multipliers: &IndexVec<FunctionalId, f64>,
-        normal: bool,
-        still: &[Velocity],
-    ) -> Self {
+    pub(super) fn new(start: &Start<'_>) -> Self {
+        let &Start { problem, surface, neighbours, state, multipliers, normal, still } = start;
         let along = if normal { Some(normals(surface, neighbours)) } else { None };
         let plane = surface.dimension == 2;
         let used = used_vertices(surface);

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | fields to be integrated, with derivatives | `field.rs` |
 //! | one facet, one edge: integral, gradient, Hessian; areas are the foam's elements | `facet.rs`, `edge.rs` |
-//! | all terms of a surface; energy and functionals | `problem.rs`, `terms.rs` |
+//! | all terms of a surface; energy and functionals | `problem.rs`, `terms.rs`, `wall_terms.rs` |
 //! | gradients, and volumes' gradients by vertex | `gradient.rs` |
 //! | directions in which vertices may move; return to constraints; normals of films | `freedom.rs`, `normals.rs` |
 //! | gradient steps with volumes held | `descend.rs` |
@@ -17,7 +17,7 @@
 //! | carrying the surface along its walls | `carry.rs` |
 //! | volumes closed on the walls themselves, by the foam's kernels | `closed.rs` |
 
-mod assemble;
+pub(crate) mod assemble;
 pub(crate) mod carry;
 pub(crate) mod closed;
 pub(crate) mod contact;
@@ -33,6 +33,7 @@ mod normals;
 mod problem;
 mod sliver;
 pub(crate) mod terms;
+mod wall_terms;
 
 pub use problem::{Functional, FunctionalId, Measured, Problem, Values};
 
