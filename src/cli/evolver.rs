@@ -208,6 +208,9 @@ fn run_file(arguments: &RunArguments) -> Result<(), CliError> {
     let read_section = std::mem::take(&mut document.commands);
     let mut session = Session::new(document).map_err(ended)?;
     session.set_budget(arguments.max_commands);
+    if arguments.as_printed {
+        session.keep_chords();
+    }
     let flow = session.run(&source, &read_section, &mut host);
     let flow = flow.and_then(|flow| {
         if flow == Flow::Quit { Ok(flow) } else { all_commands(arguments, &mut session, &mut host) }

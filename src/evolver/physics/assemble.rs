@@ -13,6 +13,7 @@ use crate::{
     index::{Id, IndexVec, checked_u32},
 };
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// The directions of a vertex and the first of its unknowns.
 #[derive(Clone, Copy, Debug)]
@@ -75,32 +76,39 @@ impl Share {
     }
 }
 
+/// Where a Newton step starts, and what it may move.
+#[derive(Clone, Copy)]
+pub(crate) struct Start<'a> {
+    pub(crate) problem: &'a Problem,
+    pub(crate) surface: &'a Surface,
+    pub(crate) neighbours: &'a Neighbours,
+    pub(crate) state: &'a State,
+    pub(crate) multipliers: &'a IndexVec<FunctionalId, f64>,
+    /// Whether vertices move along the normals of the films only.
+    pub(crate) normal: bool,
+    /// Motions to which steps are at right angles.
+    pub(crate) still: &'a [Velocity],
+}
+
 impl Assembled {
-    /// `normal` restricts vertices to the normals of the films; steps are at right angles to the motions in `still`.
-    pub(super) fn new(
-        problem: &Problem,
-        (surface, neighbours): (&Surface, &Neighbours),
-        state: &State,
-        multipliers: &IndexVec<FunctionalId, f64>,
-        normal: bool,
-        still: &[Velocity],
-    ) -> Self {
+    pub(super) fn new(start: &Start<'_>) -> Self {
+        let &Start { problem, surface, neighbours, state, multipliers, normal, still } = start;
         let along = if normal { Some(normals(surface, neighbours)) } else { None };
         let plane = surface.dimension == 2;
         let used = used_vertices(surface);
-        let mut freedoms = 0;
-        let own = |vertex: VertexId| {
+        let directions_of = |at: usize| {
+            let vertex = VertexId::from_index(at);
             let along = along.as_ref().and_then(|along| along[vertex].as_ref());
-            let along = if used[vertex.index()] {
-                problem.directions(state, vertex, along, plane)
-            } else {
-                Directions::default()
-            };
+            if used[at] { problem.directions(state, vertex, along, plane) } else { Directions::default() }
+        };
+        let all: Vec<Directions> = (0..problem.holds.len()).into_par_iter().map(directions_of).collect();
+        let mut freedoms = 0;
+        let own = |along: Directions| {
             let first = checked_u32(freedoms);
             freedoms += along.as_slice().len();
             Own { first, along }
         };
-        let directions: IndexVec<VertexId, Own> = problem.holds.ids().map(own).collect();
+        let directions: IndexVec<VertexId, Own> = all.into_iter().map(own).collect();
         let held = problem.held();
         let mut assembled = Self {
             directions,
@@ -133,7 +141,11 @@ impl Assembled {
     fn elements(&mut self, problem: &Problem, state: &State, multipliers: &IndexVec<FunctionalId, f64>) {
         let weights = Weights::lagrangian(problem, multipliers);
         let mut forces: IndexVec<VertexId, DVec3> = IndexVec::from_elem(DVec3::ZERO, problem.holds.len());
-        for share in problem.shares(&state.places, &weights, &self.directions) {
+        let shares = problem.shares(&state.places, &weights, &self.directions);
+        let entries = shares.iter().map(|share| share.entries.len()).sum();
+        self.entries.reserve(entries);
+        self.values.reserve(entries);
+        for share in shares {
             self.entries.extend(share.entries);
             self.values.extend(share.values);
             for (vertex, force) in share.forces {
@@ -170,7 +182,7 @@ impl Assembled {
 
     /// The gradients of the held functionals.
     fn constrain(&mut self, problem: &Problem, state: &State) {
-        let slots = problem.gradients(&state.places, problem.slots()).functionals;
+        let slots = problem.functional_gradients(&state.places);
         let mut rows = IndexVec::from_elem(None, problem.functionals.len());
         for (at, &id) in self.held.iter().enumerate() {
             rows[id] = Some(checked_u32(self.gradient.len() + at));

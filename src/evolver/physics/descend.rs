@@ -208,7 +208,7 @@ impl Restoring {
             }
             if error > 0.5 * before && step + 1 < RESTORATIONS {
                 // No good progress: the gradients are old.
-                let slots = problem.gradients(&state.places, problem.slots()).functionals;
+                let slots = problem.functional_gradients(&state.places);
                 fresh = Some(Self::new(problem, state, &slots)?);
             }
         }

@@ -25,6 +25,9 @@ pub(super) enum EdgeField {
 pub(super) const STRAIGHT_POINTS: usize = 2;
 pub(super) const BENT_POINTS: usize = 4;
 
+/// Gauss points where contents are to be those of the wall itself: below that the rule's error shows beside the slivers.
+pub(super) const FINE_POINTS: usize = 6;
+
 /// The rule for edges of `nodes` nodes at `points` points.
 pub(super) fn rule(nodes: usize, points: usize) -> Vec<CurvePoint> {
     curve_points(nodes, points)
@@ -144,21 +147,32 @@ pub(super) fn add_gap(factor: f64, wall: &Bound, nodes: &[DVec3], gradient: &mut
     }
 }
 
-/// The step of the differences of [`add_gap`] that make its Hessian, as a part of the chord: third derivatives of walls are
-/// not at hand, and differences of an exact gradient are good to 1e-10 of it.
-const GAP_STEP: f64 = 1e-5;
-
-/// Adds `factor` times the Hessian of [`gap`].
+/// Adds `factor` times the Hessian of [`gap`], by differences of its gradient.
 pub(super) fn add_gap_hessian(factor: f64, wall: &Bound, nodes: &[DVec3], hessian: &mut Blocks) {
-    let step = GAP_STEP * nodes[0].distance(nodes[1]);
-    for column in 0..2 {
-        let mut blocks = [[DVec3::ZERO; 3]; 2];
+    add_differences(nodes, &|nodes, gradient| add_gap(factor, wall, nodes, gradient), hessian);
+}
+
+/// The step of differences of exact gradients, as a part of the edge: third derivatives of walls are not at hand, and these
+/// are good to 1e-10 of the Hessian.
+const STEP: f64 = 1e-5;
+
+/// Adds the Hessian of a function of an edge's nodes, by central differences of its gradient.
+pub(super) fn add_differences(
+    nodes: &[DVec3],
+    add_gradient: &dyn Fn(&[DVec3], &mut [DVec3]),
+    hessian: &mut Blocks,
+) {
+    let count = nodes.len();
+    let step = STEP * nodes[0].distance(nodes[count - 1]);
+    for column in 0..count {
+        let mut blocks = [[DVec3::ZERO; 3]; 3];
         for axis in 0..3 {
             let moved = |sign: f64| {
-                let mut moved = [nodes[0], nodes[1]];
+                let mut moved = [DVec3::ZERO; 3];
+                moved[..count].copy_from_slice(nodes);
                 moved[column][axis] += sign * step;
-                let mut gradient = [DVec3::ZERO; 2];
-                add_gap(factor, wall, &moved, &mut gradient);
+                let mut gradient = [DVec3::ZERO; 3];
+                add_gradient(&moved[..count], &mut gradient[..count]);
                 gradient
             };
             let (up, down) = (moved(1.0), moved(-1.0));
@@ -166,7 +180,7 @@ pub(super) fn add_gap_hessian(factor: f64, wall: &Bound, nodes: &[DVec3], hessia
                 block[axis] = (up - down) / (2.0 * step);
             }
         }
-        for (row, columns) in blocks.iter().enumerate() {
+        for (row, columns) in blocks.iter().enumerate().take(count) {
             let block = DMat3::from_cols(columns[0], columns[1], columns[2]);
             // Half of each block and of its transpose keep the sum symmetric.
             hessian.add(row, column, 0.5 * block);

@@ -82,7 +82,7 @@ impl FacetField {
         }
     }
 
-    /// Adds `factor` times the gradient, and the Hessian where it is asked for.
+    /// Adds `factor` times the gradient, and the blocks on and below the diagonal of the Hessian where it is asked for.
     pub(super) fn add(
         &self,
         factor: f64,
@@ -144,7 +144,7 @@ fn add_flat_area(factor: f64, nodes: [DVec3; 3], gradient: &mut [DVec3], hessian
     let bend = half * cross_matrix(unit);
     for i in 0..3 {
         let left = turns[i].transpose() * flat;
-        for (j, turn) in turns.iter().enumerate() {
+        for (j, turn) in turns.iter().enumerate().take(i + 1) {
             let both = left * *turn;
             hessian.add(
                 i,
@@ -172,7 +172,7 @@ fn add_flat_height(factor: f64, nodes: [DVec3; 3], gradient: &mut [DVec3], hessi
     let Some(hessian) = hessian else { return };
     let (sixth, turn) = (factor / 6.0, 0.5 * factor * mean);
     for i in 0..3 {
-        for j in 0..3 {
+        for j in 0..=i {
             // ∂²n_z/∂xᵢ∂yⱼ is 1 for the next corner and −1 for the one before.
             let sign = match (3 + j - i) % 3 {
                 0 => 0.0,
@@ -280,7 +280,8 @@ pub(super) mod tests {
             assert!((here - slope).abs() < 1e-8, "column {column}: {here} {slope}");
             for row in 0..3 * count {
                 let second = (gu[row / 3][row % 3] - gd[row / 3][row % 3]) / (2.0 * step);
-                let here = hessian.as_mat()[(row, column)];
+                let (i, j) = (row.max(column), row.min(column));
+                let here = hessian.as_mat()[(i, j)];
                 assert!((here - second).abs() < 1e-7, "{row} {column}: {here} {second}");
             }
         }

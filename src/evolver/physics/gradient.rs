@@ -5,7 +5,7 @@ use super::{
     assemble::{Own, Share},
     edge::{self, EdgeField},
     facet::FacetField,
-    problem::{Destination, EdgePart, FunctionalId, Problem, shifted},
+    problem::{Destination, EdgePart, FunctionalId, Part, Problem, Term, shifted},
 };
 use crate::{
     evolver::surface::VertexId,
@@ -14,35 +14,45 @@ use crate::{
 };
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
-/// Which functionals depend on a vertex, and their gradients there, vertex after vertex.
-#[derive(Clone, Debug)]
-pub(crate) struct Slots {
+/// Which functionals depend on which vertex, vertex after vertex.
+#[derive(Debug)]
+struct SlotPattern {
     starts: Vec<u32>,
     ids: Vec<FunctionalId>,
+}
+
+/// The gradients of the functionals at the vertices that they depend on.
+#[derive(Clone, Debug)]
+pub(crate) struct Slots {
+    pattern: Arc<SlotPattern>,
     pub(crate) values: Vec<DVec3>,
 }
 
 impl Slots {
     /// The places of a vertex's entries.
     pub(crate) fn range(&self, vertex: usize) -> std::ops::Range<usize> {
-        self.starts[vertex] as usize..self.starts[vertex + 1] as usize
+        self.pattern.starts[vertex] as usize..self.pattern.starts[vertex + 1] as usize
     }
 
     /// The functionals that depend on a vertex with their gradients there.
     pub(crate) fn at(&self, vertex: VertexId) -> impl Iterator<Item = (FunctionalId, DVec3)> + '_ {
         let range = self.range(vertex.index());
-        self.ids[range.clone()].iter().copied().zip(self.values[range].iter().copied())
+        self.pattern.ids[range.clone()].iter().copied().zip(self.values[range].iter().copied())
     }
 
     fn add(&mut self, vertex: u32, id: FunctionalId, value: DVec3) {
-        let range = self.range(vertex as usize);
-        for slot in range {
-            if self.ids[slot] == id {
+        for slot in self.range(vertex as usize) {
+            if self.pattern.ids[slot] == id {
                 self.values[slot] += value;
                 return;
             }
         }
+    }
+
+    fn cleared(&self) -> Self {
+        Self { pattern: Arc::clone(&self.pattern), values: vec![DVec3::ZERO; self.values.len()] }
     }
 }
 
@@ -76,6 +86,32 @@ impl Weights {
             Destination::Energy => self.energy,
             Destination::Functional(id) => self.functionals[id],
         }
+    }
+}
+
+/// Where gradients are summed.
+struct Sink {
+    /// By vertex, where it is asked for.
+    energy: Option<Vec<DVec3>>,
+    functionals: Slots,
+}
+
+impl Sink {
+    fn cleared(&self) -> Self {
+        let energy = self.energy.as_ref().map(|energy| vec![DVec3::ZERO; energy.len()]);
+        Self { energy, functionals: self.functionals.cleared() }
+    }
+
+    fn add_all(&mut self, parts: &[Self]) {
+        let add = |sums: &mut [DVec3], of: &(dyn Fn(&Self) -> &[DVec3] + Sync)| {
+            sums.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(at, sum)| {
+                *sum = parts.iter().map(|part| of(part)[at]).sum();
+            });
+        };
+        if let Some(energy) = &mut self.energy {
+            add(energy, &|part| part.energy.as_deref().unwrap_or_default());
+        }
+        add(&mut self.functionals.values, &|part| &part.functionals.values);
     }
 }
 
@@ -122,93 +158,121 @@ impl Problem {
             starts[at] += starts[at - 1];
         }
         let ids: Vec<FunctionalId> = pairs.into_iter().map(|(_, id)| id).collect();
-        Slots { values: vec![DVec3::ZERO; ids.len()], starts, ids }
+        Slots { values: vec![DVec3::ZERO; ids.len()], pattern: Arc::new(SlotPattern { starts, ids }) }
     }
 
     /// The gradients at `places`; `slots` is a pattern of this problem.
-    pub(crate) fn gradients(&self, places: &Places, mut slots: Slots) -> Gradients {
+    pub(crate) fn gradients(&self, places: &Places, slots: Slots) -> Gradients {
+        let Sink { energy, functionals } = self.gradients_of(places, slots, true);
+        Gradients { energy: energy.unwrap_or_default().into(), functionals }
+    }
+
+    /// The gradients of the held functionals alone.
+    pub(crate) fn functional_gradients(&self, places: &Places) -> Slots {
+        self.gradients_of(places, self.slots(), false).functionals
+    }
+
+    fn gradients_of(&self, places: &Places, mut slots: Slots, energy: bool) -> Sink {
         slots.values.fill(DVec3::ZERO);
-        let mut energy = vec![DVec3::ZERO; places.len()];
-        self.facet_gradients(places.as_slice(), &mut energy, &mut slots);
+        let mut sink = Sink { energy: energy.then(|| vec![DVec3::ZERO; places.len()]), functionals: slots };
+        let places = places.as_slice();
+        if self.facets.len() < PARTS * CHUNK {
+            self.facet_gradients(&self.facets, places, &mut sink);
+        } else {
+            let parts = self.facets.par_chunks(self.facets.len().div_ceil(PARTS));
+            let parts: Vec<Sink> = parts
+                .map(|terms| {
+                    let mut part = sink.cleared();
+                    self.facet_gradients(terms, places, &mut part);
+                    part
+                })
+                .collect();
+            sink.add_all(&parts);
+        }
         let mut local = [DVec3::ZERO; 6];
         for term in &self.edges {
-            let nodes = term.places(places.as_slice());
+            let nodes = term.places(places);
             let nodes = &nodes[..usize::from(term.count)];
             let rule = self.rule(nodes.len());
-            if term.tension.abs() > 0.0 {
+            if energy && term.tension.abs() > 0.0 {
                 local.fill(DVec3::ZERO);
                 EdgeField::Length.add(term.tension, rule, nodes, &mut local, None);
-                self.pass(term.nodes(), &local, Destination::Energy, &mut energy, &mut slots);
+                self.pass(term.nodes(), &local, Destination::Energy, &mut sink);
             }
-            for part in &self.edge_parts[term.parts()] {
+            for part in self.edge_parts[term.parts()].iter().filter(|part| self.counts(part, energy)) {
                 local.fill(DVec3::ZERO);
                 self.edge_part(part, nodes, part.weight, &mut local, None);
-                self.pass(term.nodes(), &local, part.destination, &mut energy, &mut slots);
+                self.pass(term.nodes(), &local, part.destination, &mut sink);
             }
         }
         for point in &self.points {
-            let slope = point.weight * point.field.jet(places[point.vertex]).gradient;
+            let slope = point.weight * point.field.jet(places[point.vertex.index()]).gradient;
             let node = [crate::index::checked_u32(point.vertex.index())];
-            self.pass(&node, &[slope], point.destination, &mut energy, &mut slots);
+            self.pass(&node, &[slope], point.destination, &mut sink);
         }
-        Gradients { energy: energy.into(), functionals: slots }
+        sink
     }
 
-    fn facet_gradients(&self, places: &[DVec3], energy: &mut [DVec3], slots: &mut Slots) {
+    /// Whether a part enters the gradients that are asked for.
+    fn counts(&self, part: &Part, energy: bool) -> bool {
+        match part.destination {
+            Destination::Energy => energy,
+            Destination::Functional(id) => {
+                let functional = &self.functionals[id];
+                functional.target.is_some() || (energy && functional.coupling.abs() > 0.0)
+            }
+        }
+    }
+
+    fn facet_gradients(&self, terms: &[Term<6>], places: &[DVec3], sink: &mut Sink) {
         let mut local = [DVec3::ZERO; 6];
-        for term in &self.facets {
+        let energy = sink.energy.is_some();
+        for term in terms {
             let nodes = term.places(places);
             let nodes = &nodes[..usize::from(term.count)];
-            if term.tension.abs() > 0.0 {
+            if energy && term.tension.abs() > 0.0 {
+                local.fill(DVec3::ZERO);
                 if let [a, b, c] = nodes {
                     // ∂|n|/∂a = (b − c) × n/|n| and round the corners; the area is half of |n|.
                     let n = (*b - *a).cross(*c - *a);
                     let unit = 0.5 * term.tension / n.length() * n;
-                    for (&node, far) in term.nodes().iter().zip([*c - *b, *a - *c, *b - *a]) {
-                        energy[node as usize] += unit.cross(far);
+                    for (out, far) in local.iter_mut().zip([*c - *b, *a - *c, *b - *a]) {
+                        *out = unit.cross(far);
                     }
                 } else {
-                    local.fill(DVec3::ZERO);
                     FacetField::Area.add(term.tension, nodes, &mut local, None);
-                    self.pass(term.nodes(), &local, Destination::Energy, energy, slots);
                 }
+                self.pass(term.nodes(), &local, Destination::Energy, sink);
             }
-            for part in &self.facet_parts[term.parts()] {
+            for part in self.facet_parts[term.parts()].iter().filter(|part| self.counts(part, energy)) {
                 local.fill(DVec3::ZERO);
                 let field = &self.facet_fields[part.field as usize];
                 match shifted(nodes, part.offset) {
                     Some(moved) => field.add(part.weight, &moved[..nodes.len()], &mut local, None),
                     None => field.add(part.weight, nodes, &mut local, None),
                 }
-                self.pass(term.nodes(), &local, part.destination, energy, slots);
+                self.pass(term.nodes(), &local, part.destination, sink);
             }
         }
     }
 
-    fn pass(
-        &self,
-        nodes: &[u32],
-        local: &[DVec3],
-        destination: Destination,
-        energy: &mut [DVec3],
-        slots: &mut Slots,
-    ) {
-        match destination {
-            Destination::Energy => {
-                for (&node, &value) in nodes.iter().zip(local) {
-                    energy[node as usize] += value;
-                }
+    fn pass(&self, nodes: &[u32], local: &[DVec3], destination: Destination, sink: &mut Sink) {
+        let mut to_energy = |factor: f64| {
+            let Some(energy) = &mut sink.energy else { return };
+            for (&node, &value) in nodes.iter().zip(local) {
+                energy[node as usize] += factor * value;
             }
+        };
+        match destination {
+            Destination::Energy => to_energy(1.0),
             Destination::Functional(id) => {
                 let functional = &self.functionals[id];
                 if functional.coupling.abs() > 0.0 {
-                    for (&node, &value) in nodes.iter().zip(local) {
-                        energy[node as usize] += functional.coupling * value;
-                    }
+                    to_energy(functional.coupling);
                 }
                 if functional.target.is_some() {
                     for (&node, &value) in nodes.iter().zip(local) {
-                        slots.add(node, id, value);
+                        sink.functionals.add(node, id, value);
                     }
                 }
             }
@@ -217,7 +281,7 @@ impl Problem {
 
     fn edge_part(
         &self,
-        part: &super::problem::Part,
+        part: &Part,
         nodes: &[DVec3],
         factor: f64,
         gradient: &mut [DVec3; 6],
@@ -238,6 +302,7 @@ impl Problem {
                     edge::add_gap_hessian(factor, wall, nodes, hessian);
                 }
             }
+            EdgePart::Sliver(sliver) => sliver.add(factor, nodes, gradient, hessian),
         }
     }
 
@@ -282,13 +347,7 @@ impl Problem {
     }
 
     /// Makes `local` the share of a facet; false where it has none.
-    fn facet_local(
-        &self,
-        term: &super::problem::Term<6>,
-        places: &[DVec3],
-        weights: &Weights,
-        local: &mut Local,
-    ) -> bool {
+    fn facet_local(&self, term: &Term<6>, places: &[DVec3], weights: &Weights, local: &mut Local) -> bool {
         let parts = &self.facet_parts[term.parts()];
         if term.tension.abs() <= 0.0 && parts.is_empty() {
             return false;
@@ -314,13 +373,7 @@ impl Problem {
     }
 
     /// Makes `local` the share of an edge.
-    fn edge_local(
-        &self,
-        term: &super::problem::Term<3>,
-        places: &[DVec3],
-        weights: &Weights,
-        local: &mut Local,
-    ) {
+    fn edge_local(&self, term: &Term<3>, places: &[DVec3], weights: &Weights, local: &mut Local) {
         let nodes = term.places(places);
         let nodes = &nodes[..usize::from(term.count)];
         local.restart(term.nodes());
@@ -338,6 +391,10 @@ impl Problem {
         }
     }
 }
+
+/// Parts of the facets of large surfaces, whose gradients are summed apart: fixed, so that sums do not depend on the number of
+/// threads.
+const PARTS: usize = 4;
 
 /// Elements whose shares one thread assembles at a time: fixed, so that the order does not depend on the number of threads.
 const CHUNK: usize = 1024;

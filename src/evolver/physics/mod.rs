@@ -8,17 +8,19 @@
 //! |---|---|
 //! | fields to be integrated, with derivatives | `field.rs` |
 //! | one facet, one edge: integral, gradient, Hessian; areas are the foam's elements | `facet.rs`, `edge.rs` |
-//! | all terms of a surface; energy and functionals | `problem.rs`, `terms.rs` |
+//! | all terms of a surface; energy and functionals | `problem.rs`, `terms.rs`, `wall_terms.rs` |
 //! | gradients, and volumes' gradients by vertex | `gradient.rs` |
 //! | directions in which vertices may move; return to constraints; normals of films | `freedom.rs`, `normals.rs` |
 //! | gradient steps with volumes held | `descend.rs` |
 //! | the matrix of a Newton step; the step and its inertia; eigenvalues, by the foam's sparse solver | `assemble.rs`, `newton.rs`, `eigen.rs` |
+//! | what lies between edges and their walls, and how much it weighs | `sliver.rs`, `contact.rs` |
 //! | carrying the surface along its walls | `carry.rs` |
 //! | volumes closed on the walls themselves, by the foam's kernels | `closed.rs` |
 
-mod assemble;
+pub(crate) mod assemble;
 pub(crate) mod carry;
 pub(crate) mod closed;
+pub(crate) mod contact;
 pub(crate) mod descend;
 mod edge;
 mod eigen;
@@ -29,7 +31,9 @@ mod gradient;
 pub(crate) mod newton;
 mod normals;
 mod problem;
+mod sliver;
 pub(crate) mod terms;
+mod wall_terms;
 
 pub use problem::{Functional, FunctionalId, Measured, Problem, Values};
 

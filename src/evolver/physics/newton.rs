@@ -5,17 +5,13 @@
 //! for each held functional and no more.
 
 use super::{
-    assemble::{Assembled, Own},
-    carry::Velocity,
+    assemble::{Assembled, Own, Start},
     descend::Restoring,
     freedom::State,
     problem::{FunctionalId, Problem, Values},
 };
 use crate::{
-    evolver::{
-        error::EvolverError,
-        surface::{Neighbours, Surface, VertexId},
-    },
+    evolver::{error::EvolverError, surface::VertexId},
     foam::solve::symmetric::{SymmetricFactor, SymmetricPattern},
     index::IndexVec,
 };
@@ -55,19 +51,12 @@ pub(super) fn failed(error: crate::foam::solve::FactorError) -> EvolverError {
 }
 
 impl Newton {
-    /// Assembles the matrix. `normal` restricts vertices to the normals of the films; `pattern` keeps the order in which the
-    /// matrix is factored for the next one with the same entries; steps leave out the motions in `still`.
+    /// Assembles the matrix. `pattern` keeps the order in which it is factored for the next one with the same entries.
     pub(crate) fn new(
-        problem: &Problem,
-        (surface, neighbours): (&Surface, &Neighbours),
-        state: &State,
-        multipliers: &IndexVec<FunctionalId, f64>,
-        normal: bool,
-        still: &[Velocity],
+        start: &Start<'_>,
         pattern: &mut Option<Arc<SymmetricPattern>>,
     ) -> Result<Self, EvolverError> {
-        let Assembled { directions, held, size, entries, values, gradient, diagonal } =
-            Assembled::new(problem, (surface, neighbours), state, multipliers, normal, still);
+        let Assembled { directions, held, size, entries, values, gradient, diagonal } = Assembled::new(start);
         let freedoms = gradient.len();
         let known = pattern.take().filter(|known| known.fits(size, &entries));
         let order = match known {
@@ -147,7 +136,7 @@ impl Problem {
             self.push(&mut moved, vertex, velocity[vertex], scale);
             self.settle(&mut moved, vertex, false);
         }
-        let slots = self.gradients(&moved.places, self.slots()).functionals;
+        let slots = self.functional_gradients(&moved.places);
         let restoring = Restoring::new(self, &moved, &slots)?;
         let values = restoring.restore(self, &mut moved)?;
         Ok((moved, values))

@@ -4,11 +4,12 @@ use super::freedom::Directions;
 use crate::{
     evolver::{
         datafile::Representation,
-        surface::{Directed, EdgeId, FacetId, Neighbours, Surface, VertexId, one_sided},
+        surface::{Directed, EdgeId, FacetId, Kind, Neighbours, Surface, VertexId, one_sided},
     },
-    index::IndexVec,
+    index::{Id, IndexVec},
 };
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// The normals at each vertex: one within a film, two where three films meet along a line, `None` (all directions) where
 /// lines meet.
@@ -20,7 +21,11 @@ pub(super) fn normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<Ve
 }
 
 fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Directions>> {
-    let areas: IndexVec<FacetId, DVec3> = surface.facets.ids().map(|id| surface.area_vector(id)).collect();
+    let areas: Vec<DVec3> = (0..surface.facets.len())
+        .into_par_iter()
+        .map(|at| surface.area_vector(FacetId::from_index(at)))
+        .collect();
+    let areas: IndexVec<FacetId, DVec3> = areas.into();
     // Neighbouring facets may be turned round: each is counted to the side of those before.
     let mut sums = IndexVec::from_elem(DVec3::ZERO, surface.vertices.len());
     for (id, facet) in surface.facets.enumerated() {
@@ -36,22 +41,22 @@ fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId
         sums[middle] =
             neighbours.facets[id].iter().map(|&(facet, _)| areas[facet]).fold(DVec3::ZERO, one_sided);
     }
-    let normal_at = |id: VertexId| {
-        let around: &[EdgeId] = match &middles[id] {
-            Some(edge) => std::slice::from_ref(edge),
-            None => &neighbours.edges[id],
-        };
-        if around.iter().all(|&edge| neighbours.facets[edge].is_empty()) {
-            return None;
-        }
-        let is_line = |edge: &EdgeId| neighbours.facets[*edge].len() > 2;
-        if around.iter().any(is_line) {
+    let normal_at = |id: VertexId| match neighbours.kinds[id] {
+        Kind::Bare => None,
+        Kind::Film => sums[id].try_normalize().map(|normal| Directions::of(&[normal])),
+        Kind::Line => {
+            let around: &[EdgeId] = match &middles[id] {
+                Some(edge) => std::slice::from_ref(edge),
+                None => &neighbours.edges[id],
+            };
+            let is_line = |edge: &EdgeId| neighbours.facets[*edge].len() > 2;
             let lines: Vec<EdgeId> = around.iter().copied().filter(is_line).collect();
-            return (lines.len() <= 2).then(|| line_normals(surface, id, &lines));
+            (lines.len() <= 2).then(|| line_normals(surface, id, &lines))
         }
-        sums[id].try_normalize().map(|normal| Directions::of(&[normal]))
     };
-    surface.vertices.ids().map(normal_at).collect()
+    let normals: Vec<_> =
+        (0..surface.vertices.len()).into_par_iter().map(|at| normal_at(VertexId::from_index(at))).collect();
+    normals.into()
 }
 
 /// The two directions across the line that a vertex lies on.

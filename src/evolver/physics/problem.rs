@@ -6,6 +6,7 @@ use super::{
     facet::FacetField,
     freedom::Hold,
     gradient::Slots,
+    sliver::Sliver,
 };
 use crate::{
     evolver::{
@@ -109,6 +110,20 @@ pub(super) struct Point {
     pub(super) weight: f64,
 }
 
+/// An edge along which a content is integrated.
+#[derive(Clone, Debug)]
+pub(super) struct Contact {
+    pub(super) edge: Term<3>,
+    pub(super) body: BodyId,
+    /// The content's sign for the body.
+    pub(super) weight: f64,
+    /// The integrand along the edge, and what lies between the edge and the wall.
+    pub(super) field: u32,
+    pub(super) sliver: u32,
+    /// The tension of the films that end there.
+    pub(super) tension: f64,
+}
+
 /// Everything that energy and functionals need, for one topology and one set of parameters.
 #[derive(Clone, Debug)]
 pub struct Problem {
@@ -124,6 +139,8 @@ pub struct Problem {
     pub(super) boundaries: IndexVec<BoundaryId, [Bound; 3]>,
     pub(super) holds: IndexVec<VertexId, Hold>,
     pub(super) rules: [Vec<CurvePoint>; 2],
+    /// The edges along which contents are integrated, body by body.
+    pub(super) contacts: Vec<Contact>,
     pub(super) strings: bool,
     /// Whether volumes are restored to a part of their shares, as quantities are, instead of absolutely.
     pub(crate) relative: bool,
@@ -131,11 +148,12 @@ pub struct Problem {
     pub(super) pattern: OnceLock<Slots>,
 }
 
-/// A field along edges, or the gap at a convex wall.
+/// A field along edges, the gap at a convex wall, or the volume between an edge and its wall.
 #[derive(Clone, Debug)]
 pub(super) enum EdgePart {
     Field(EdgeField),
     Gap(Bound),
+    Sliver(Box<Sliver>),
 }
 
 /// Energy and functionals of one set of places.
@@ -292,6 +310,7 @@ impl Problem {
                 let value = match &self.edge_fields[part.field as usize] {
                     EdgePart::Field(field) => field.value(rule, &moved[..nodes.len()]),
                     EdgePart::Gap(wall) => edge::gap(wall, &[nodes[0], nodes[nodes.len() - 1]]),
+                    EdgePart::Sliver(sliver) => sliver.value(nodes)[0],
                 };
                 sums.add(part.destination, part.weight * value);
             }

@@ -1,7 +1,7 @@
 //! The terms of a surface: which fields are integrated over which element, and where they go.
 
 use super::{
-    edge::{BENT_POINTS, EdgeField, STRAIGHT_POINTS, rule},
+    edge::{BENT_POINTS, EdgeField, FINE_POINTS, STRAIGHT_POINTS, rule},
     facet::FacetField,
     field::VectorField,
     freedom::Hold,
@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     evolver::{
-        datafile::{Datafile, FormulaVector, Method, Model, Purpose, Quantity, Representation},
+        datafile::{Datafile, FormulaVector, Method, Purpose, Quantity, Representation},
         error::EvolverError,
         language::formula::{Bound, Variables},
         surface::{
@@ -33,6 +33,8 @@ pub(crate) struct Conditions<'a> {
     pub(crate) quantities: &'a [QuantityState],
     /// Whether volumes count as quantities.
     pub(crate) relative: bool,
+    /// Whether contents are those of the wall itself, the slivers between it and the edges included.
+    pub(crate) on_walls: bool,
 }
 
 /// The numbers of a quantity that commands can change.
@@ -43,17 +45,17 @@ pub(crate) struct QuantityState {
 }
 
 /// Collects the terms.
-struct Collector<'a> {
-    data: &'a Datafile,
-    surface: &'a Surface,
-    conditions: &'a Conditions<'a>,
-    neighbours: Neighbours,
+pub(super) struct Collector<'a> {
+    pub(super) data: &'a Datafile,
+    pub(super) surface: &'a Surface,
+    pub(super) conditions: &'a Conditions<'a>,
+    pub(super) neighbours: Neighbours,
     /// The image of each facet that the bodies on its sides have.
-    images: Vec<[IVec3; 2]>,
-    problem: Problem,
-    facet_parts: Vec<Vec<Part>>,
-    edge_parts: Vec<Vec<Part>>,
-    first_quantity: usize,
+    pub(super) images: Vec<[IVec3; 2]>,
+    pub(super) problem: Problem,
+    pub(super) facet_parts: Vec<Vec<Part>>,
+    pub(super) edge_parts: Vec<Vec<Part>>,
+    pub(super) first_quantity: usize,
 }
 
 impl Problem {
@@ -86,7 +88,8 @@ impl Problem {
                 .map(|b| b.coordinates.each_ref().map(|f| f.as_ref().map_or(Bound::constant(0.0), bind)))
                 .collect(),
             holds: surface.vertices.iter().map(|vertex| hold(&vertex.common)).collect(),
-            rules: rules(data),
+            rules: rules(data, conditions.on_walls),
+            contacts: Vec::new(),
             strings: surface.representation == Representation::String,
             relative: conditions.relative,
             pattern: OnceLock::new(),
@@ -121,13 +124,14 @@ fn hold(common: &Common) -> Hold {
     }
 }
 
-fn rules(data: &Datafile) -> [Vec<crate::foam::complex::CurvePoint>; 2] {
-    let points = |default: usize| data.edge_points.unwrap_or(default);
+fn rules(data: &Datafile, on_walls: bool) -> [Vec<crate::foam::complex::CurvePoint>; 2] {
+    let least = if on_walls { FINE_POINTS } else { 0 };
+    let points = |default: usize| data.edge_points.unwrap_or(default.max(least));
     [rule(2, points(STRAIGHT_POINTS)), rule(3, points(BENT_POINTS))]
 }
 
 /// Plus for the body that a facet's normal points out of, minus for the other.
-const SIGNS: [f64; 2] = [1.0, -1.0];
+pub(super) const SIGNS: [f64; 2] = [1.0, -1.0];
 
 impl Collector<'_> {
     fn functionals(&mut self) {
@@ -163,12 +167,12 @@ impl Collector<'_> {
         checked_u32(self.problem.facet_fields.len() - 1)
     }
 
-    fn edge_field(&mut self, field: EdgePart) -> u32 {
+    pub(super) fn edge_field(&mut self, field: EdgePart) -> u32 {
         self.problem.edge_fields.push(field);
         checked_u32(self.problem.edge_fields.len() - 1)
     }
 
-    fn vector(&self, formulas: &FormulaVector) -> VectorField {
+    pub(super) fn vector(&self, formulas: &FormulaVector) -> VectorField {
         let bind = |formula: &Option<crate::evolver::language::formula::Formula>| {
             formula.as_ref().map_or(Bound::constant(0.0), |formula| formula.bind(self.conditions.variables))
         };
@@ -229,125 +233,6 @@ impl Collector<'_> {
                         let destination = Destination::Energy;
                         parts.push(Part { field: weight, destination, weight: heavy, offset });
                     }
-                }
-            }
-        }
-    }
-
-    /// Energies and contents of edges on constraints and boundaries; of vertices, in the string model.
-    fn constraints(&mut self) {
-        let integrands: Vec<(Option<FormulaVector>, Option<FormulaVector>)> = self
-            .data
-            .constraints
-            .iter()
-            .map(|c| (c.energy.clone(), c.content.clone()))
-            .chain(self.data.boundaries.iter().map(|b| (b.energy.clone(), b.content.clone())))
-            .collect();
-        let of_constraints = self.data.constraints.len();
-        for (at, (energy, content)) in integrands.iter().enumerate() {
-            let on = |common: &Common| {
-                if at < of_constraints {
-                    common.constraints.iter().any(|id| id.index() == at)
-                } else {
-                    common.boundary.is_some_and(|id| id.index() + of_constraints == at)
-                }
-            };
-            if self.problem.strings {
-                self.point_integrals(energy.as_ref(), content.as_ref(), &on);
-                continue;
-            }
-            if let Some(energy) = energy {
-                let field = EdgePart::Field(EdgeField::Along(self.vector(energy)));
-                let field = self.edge_field(field);
-                for (id, _) in self.surface.edges.enumerated().filter(|(_, edge)| on(&edge.common)) {
-                    let part =
-                        Part { field, destination: Destination::Energy, weight: 1.0, offset: DVec3::ZERO };
-                    self.edge_parts[id.index()].push(part);
-                }
-            }
-            if let Some(content) = content {
-                let field = EdgePart::Field(EdgeField::Along(self.vector(content)));
-                let field = self.edge_field(field);
-                // Surface Evolver takes the contents of boundaries with the other sign.
-                let sign = if at < of_constraints { 1.0 } else { -1.0 };
-                for (id, edge) in self.surface.edges.enumerated().filter(|(_, edge)| on(&edge.common)) {
-                    if !edge.noncontent {
-                        self.edge_content(id, field, sign);
-                    }
-                }
-            }
-        }
-        self.gaps();
-    }
-
-    /// The content of an edge goes to the bodies of its facets, in the sense in which each facet runs along it.
-    fn edge_content(&mut self, edge: EdgeId, field: u32, factor: f64) {
-        for &(facet, at) in &self.neighbours.facets[edge] {
-            let facet = &self.surface.facets[facet];
-            if facet.noncontent {
-                continue;
-            }
-            let along = if facet.edges[at].reversed { -factor } else { factor };
-            for (side, sign) in SIGNS.into_iter().enumerate() {
-                let Some(body) = facet.bodies[side] else { continue };
-                let destination = Destination::Functional(FunctionalId::from_index(body.index()));
-                let part = Part { field, destination, weight: sign * along, offset: DVec3::ZERO };
-                self.edge_parts[edge.index()].push(part);
-            }
-        }
-    }
-
-    /// The gaps between chords and convex constraints; bent edges have none.
-    fn gaps(&mut self) {
-        if self.conditions.gap.abs() <= 0.0 || self.surface.model == Model::Quadratic {
-            return;
-        }
-        for (at, constraint) in self.data.constraints.iter().enumerate().filter(|(_, c)| c.convex) {
-            let wall = constraint.formula.bind(self.conditions.variables);
-            let field = self.edge_field(EdgePart::Gap(wall));
-            for (id, edge) in self.surface.edges.enumerated() {
-                if !edge.common.fixed && edge.common.constraints.iter().any(|id| id.index() == at) {
-                    let weight = self.conditions.gap;
-                    let part = Part { field, destination: Destination::Energy, weight, offset: DVec3::ZERO };
-                    self.edge_parts[id.index()].push(part);
-                }
-            }
-        }
-    }
-
-    /// In the string model constraints have scalar integrands, taken where strings end on them.
-    fn point_integrals(
-        &mut self,
-        energy: Option<&FormulaVector>,
-        content: Option<&FormulaVector>,
-        on: &dyn Fn(&Common) -> bool,
-    ) {
-        let bind = |formulas: Option<&FormulaVector>| {
-            formulas.and_then(|f| f[0].as_ref()).map(|formula| formula.bind(self.conditions.variables))
-        };
-        let (energy, content) = (bind(energy), bind(content));
-        if let Some(field) = energy {
-            for (vertex, _) in self.surface.vertices.enumerated().filter(|(_, v)| on(&v.common)) {
-                let destination = Destination::Energy;
-                self.problem.points.push(Point { vertex, field: field.clone(), destination, weight: 1.0 });
-            }
-        }
-        let Some(field) = content else { return };
-        for facet in &self.surface.facets {
-            let (Some(&first), Some(&last)) = (facet.edges.first(), facet.edges.last()) else { continue };
-            let (start, end) = (self.surface.tail(first), self.surface.head(last));
-            if start == end {
-                continue;
-            }
-            for (vertex, weight) in [(start, -1.0), (end, 1.0)] {
-                if !on(&self.surface.vertices[vertex].common) {
-                    continue;
-                }
-                for (side, sign) in SIGNS.into_iter().enumerate() {
-                    let Some(body) = facet.bodies[side] else { continue };
-                    let destination = Destination::Functional(FunctionalId::from_index(body.index()));
-                    let weight = sign * weight;
-                    self.problem.points.push(Point { vertex, field: field.clone(), destination, weight });
                 }
             }
         }
@@ -428,18 +313,21 @@ impl Collector<'_> {
             if edge.tension.abs() <= 0.0 && parts.is_empty() {
                 continue;
             }
-            let mut nodes = vec![
-                (edge.ends[0], IVec3::ZERO),
-                (edge.ends[1], surface.wrap(Directed { edge: element, reversed: false })),
-            ];
-            if let Some(middle) = edge.middle {
-                nodes.insert(1, (middle, IVec3::ZERO));
-            }
-            let term = term(surface, &nodes, edge.tension);
+            let term = edge_term(surface, element);
             push(&mut self.problem.edges, &mut self.problem.edge_parts, term, parts);
         }
         self.problem
     }
+}
+
+pub(super) fn edge_term(surface: &Surface, id: EdgeId) -> Term<3> {
+    let edge = &surface.edges[id];
+    let end = surface.wrap(Directed { edge: id, reversed: false });
+    let mut nodes = vec![(edge.ends[0], IVec3::ZERO), (edge.ends[1], end)];
+    if let Some(middle) = edge.middle {
+        nodes.insert(1, (middle, IVec3::ZERO));
+    }
+    term(surface, &nodes, edge.tension)
 }
 
 fn term<const N: usize>(surface: &Surface, corners: &[(VertexId, IVec3)], tension: f64) -> Term<N> {

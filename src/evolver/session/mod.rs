@@ -7,6 +7,7 @@
 //! | procedures, functions, local variables | `routines.rs` |
 //! | assignments; arrays | `assign.rs`, `arrays.rs` |
 //! | values of expressions | `evaluate.rs`, `attributes.rs` |
+//! | contents on walls; volumes held against those of the closed bodies | `contents.rs` |
 //! | moving the surface: `g`, `r`, `V` and their kin | `motion.rs` |
 //! | Newton steps and eigenvalues; sliding along walls | `seek.rs`, `slide.rs` |
 //! | short edges, small and narrow facets | `mend.rs` |
@@ -18,6 +19,7 @@
 mod arrays;
 mod assign;
 mod attributes;
+mod contents;
 mod dump;
 mod elements;
 mod evaluate;
@@ -30,6 +32,7 @@ mod routines;
 mod seek;
 mod slide;
 
+use contents::Contents;
 pub use execute::Flow;
 pub use format::significant;
 
@@ -51,6 +54,7 @@ use crate::{
     foam::solve::symmetric::SymmetricPattern,
     index::{Id, IndexVec},
 };
+use glam::DVec3;
 use std::{collections::BTreeMap, sync::Arc};
 
 /// What a session asks of the program around it.
@@ -86,6 +90,11 @@ pub struct Session {
     normal: bool,
     /// Whether volumes and energies count as quantities, as they do in Surface Evolver from the first use that needs it.
     by_quantities: bool,
+    /// Along what contents are integrated.
+    contents: Contents,
+    /// The ends of the edges of contact lines when their slivers were last looked at, and when volumes were last compared.
+    looked_at: Vec<[DVec3; 2]>,
+    compared: Vec<[DVec3; 2]>,
     quiet: bool,
     eigenvalue: f64,
     /// How many commands may still run.
@@ -110,10 +119,6 @@ struct Current {
 
 /// Commands that a session runs before it believes that a loop does not end.
 pub const COMMAND_BUDGET: u64 = 10_000_000;
-
-/// By how much of a body's volume the two ways to measure it may differ: the coarsest contact lines in use cut off less than a
-/// percent.
-const PARTED: f64 = 0.02;
 
 /// The volumes of a body by its integrals and by its closed surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,6 +174,9 @@ impl Session {
             descent,
             normal: true,
             by_quantities: data.boundaries.iter().any(|b| b.energy.is_some() || b.content.is_some()),
+            contents: Contents::Chords,
+            looked_at: Vec::new(),
+            compared: Vec::new(),
             quiet: false,
             eigenvalue: f64::NAN,
             budget: COMMAND_BUDGET,
@@ -182,7 +190,7 @@ impl Session {
         let name: Arc<str> = session.data.source.name.as_str().into();
         session.texts.insert("datafilename".into(), name);
         session.make_quadratic();
-        session.current()?;
+        session.compare_volumes()?;
         Ok(session)
     }
 
@@ -223,33 +231,40 @@ impl Session {
             self.problem = None;
         }
         if self.problem.is_none() {
-            let conditions = Conditions {
-                variables: &self.variables,
-                gravity: self.gravity(),
-                gap: self.gap,
-                quantities: &self.quantities,
-                relative: self.by_quantities,
-            };
-            let mut problem = Problem::new(&self.data, &self.surface, &conditions)?;
-            let mut state = State::new(&self.surface);
-            problem.follow_boundaries(&self.surface, &mut state);
-            if let Err(vertex) = problem.settle_all(&mut state, false) {
-                let number = vertex.index() + 1;
-                let message = format!("vertex {number} cannot be brought onto its constraints");
-                return Err(EvolverError::Surface(message));
-            }
-            state.store(&mut self.surface);
-            let mut values = problem.values(&state.places);
-            if let Some(torus) = self.surface.torus_volume() {
-                problem.take_off_tori(torus, &values);
-                values = problem.values(&state.places);
-            }
-            self.problem = Some(Current { problem, state, values, inputs });
+            self.problem = Some(self.new_problem(inputs)?);
+            self.leave_chords()?;
         }
         match &mut self.problem {
             Some(current) => Ok(current),
             None => Err(EvolverError::Surface("the surface has no terms".to_owned())),
         }
+    }
+
+    /// The problem of the present surface, its vertices brought onto their constraints.
+    fn new_problem(&mut self, inputs: Vec<f64>) -> Result<Current, EvolverError> {
+        let conditions = Conditions {
+            variables: &self.variables,
+            gravity: self.gravity(),
+            gap: self.gap,
+            quantities: &self.quantities,
+            relative: self.by_quantities,
+            on_walls: self.contents == Contents::OnWalls,
+        };
+        let mut problem = Problem::new(&self.data, &self.surface, &conditions)?;
+        let mut state = State::new(&self.surface);
+        problem.follow_boundaries(&self.surface, &mut state);
+        if let Err(vertex) = problem.settle_all(&mut state, false) {
+            let number = vertex.index() + 1;
+            let message = format!("vertex {number} cannot be brought onto its constraints");
+            return Err(EvolverError::Surface(message));
+        }
+        state.store(&mut self.surface);
+        let mut values = problem.values(&state.places);
+        if let Some(torus) = self.surface.torus_volume() {
+            problem.take_off_tori(torus, &values);
+            values = problem.values(&state.places);
+        }
+        Ok(Current { problem, state, values, inputs })
     }
 
     /// From now on volumes and energies count as quantities.
@@ -297,7 +312,7 @@ impl Session {
     /// # Errors
     /// [`EvolverError`] if the surface makes no sense.
     pub fn bodies(&mut self) -> Result<Vec<BodyReport>, EvolverError> {
-        self.current()?;
+        self.compare_volumes()?;
         let Some(current) = &self.problem else { return Ok(Vec::new()) };
         let closed = closed_volumes(&current.problem, &self.surface, &current.state.places);
         Ok(self
@@ -312,33 +327,6 @@ impl Session {
                 pressure: self.pressure(id),
             })
             .collect())
-    }
-
-    /// Sees that the volumes by integrals are those of the closed bodies.
-    ///
-    /// # Errors
-    /// [`EvolverError::Surface`] with both volumes of a body where they part.
-    fn compare_volumes(&mut self) -> Result<(), EvolverError> {
-        let content = |c: &Option<super::datafile::FormulaVector>| c.is_some();
-        if !self.data.constraints.iter().any(|constraint| content(&constraint.content)) {
-            return Ok(());
-        }
-        for body in self.bodies()? {
-            let Some(closed) = body.closed else { continue };
-            let size = body.target.unwrap_or(body.volume).abs();
-            if (body.volume - closed).abs() > PARTED * size {
-                let message = format!(
-                    "body {}: the content integrals give the volume {}, but the body closed on its walls holds {}. \
-                     The integrand meets its singularity or cut there, or the contact line has left its wall between \
-                     vertices; refine, or choose the integrand's origin away from the body",
-                    body.id,
-                    significant(body.volume, 10),
-                    significant(closed, 10)
-                );
-                return Err(EvolverError::Surface(message));
-            }
-        }
-        Ok(())
     }
 
     fn pressure(&self, body: BodyId) -> f64 {

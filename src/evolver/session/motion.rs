@@ -20,6 +20,9 @@ const MOST_ELEMENTS: usize = 4_000_000;
 /// Steps of one `g` at most.
 const MOST_STEPS: f64 = 1e7;
 
+/// Steps of `g` between two looks at what chords would gain.
+const STEPS_ON_CHORDS: usize = 10;
+
 pub(super) type Done = Result<(), EvolverError>;
 
 impl Session {
@@ -207,7 +210,7 @@ impl Session {
     fn iterate(&mut self, steps: f64, host: &mut dyn Host) -> Done {
         let label = if self.has_films() { "area" } else { "length" };
         let mut left = steps;
-        let mut slots = None;
+        let (mut slots, mut steps_done) = (None, 0_usize);
         while left > 0.5 {
             let allowed = if host.interrupted() { Err(EvolverError::Interrupted) } else { self.spend() };
             if let Err(stop) = allowed {
@@ -215,6 +218,11 @@ impl Session {
                 self.finish_motion()?;
                 return Err(stop);
             }
+            if steps_done % STEPS_ON_CHORDS == 0 {
+                self.look_at_contents()?;
+                slots = None;
+            }
+            steps_done += 1;
             self.current()?;
             let Some(current) = &mut self.problem else { return Ok(()) };
             let old = current.state.clone();
@@ -255,7 +263,7 @@ impl Session {
         if let Some(current) = &self.problem {
             current.state.store(&mut self.surface);
         }
-        self.compare_volumes()
+        self.look_at_contents()
     }
 
     /// `v`: the bodies, with their volumes both ways.

@@ -29,6 +29,13 @@ pub(super) struct Told {
     files: Vec<(String, String, bool)>,
 }
 
+impl std::fmt::Write for Told {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        self.text.push_str(text);
+        Ok(())
+    }
+}
+
 impl Host for Told {
     fn print(&mut self, text: &str) {
         self.text.push_str(text);

@@ -5,7 +5,7 @@ use crate::{
     evolver::{
         error::EvolverError,
         language::formula::is_zero,
-        physics::{FunctionalId, Values, carry::Velocity, freedom::State, newton::Newton},
+        physics::{FunctionalId, Values, assemble::Start, carry::Velocity, freedom::State, newton::Newton},
     },
     index::{Id, IndexVec},
 };
@@ -25,15 +25,16 @@ impl Session {
         if self.multipliers.iter().all(|m| is_zero(*m)) {
             self.multipliers = current.problem.estimated_multipliers(&current.state)?;
         }
-        let newton = Newton::new(
-            &current.problem,
-            (&self.surface, &around),
-            &current.state,
-            &self.multipliers,
-            self.normal,
+        let start = Start {
+            problem: &current.problem,
+            surface: &self.surface,
+            neighbours: &around,
+            state: &current.state,
+            multipliers: &self.multipliers,
+            normal: self.normal,
             still,
-            &mut self.pattern,
-        )?;
+        };
+        let newton = Newton::new(&start, &mut self.pattern)?;
         Ok((newton, current.values.clone(), current.state.clone()))
     }
 
@@ -92,9 +93,16 @@ impl Session {
         // On the way to a saddle the energy may rise, but the forces must fall.
         let around = self.neighbours();
         let Some(current) = &self.problem else { return Ok(None) };
-        let films = (&self.surface, &*around);
-        let there =
-            Newton::new(&current.problem, films, moved, multipliers, self.normal, &[], &mut self.pattern)?;
+        let start = Start {
+            problem: &current.problem,
+            surface: &self.surface,
+            neighbours: &around,
+            state: moved,
+            multipliers,
+            normal: self.normal,
+            still: &[],
+        };
+        let there = Newton::new(&start, &mut self.pattern)?;
         if there.residual() < residual {
             return Ok(None);
         }

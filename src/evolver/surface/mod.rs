@@ -29,7 +29,7 @@ pub use check::{Fault, check};
 pub(crate) use constrain::{Wall, multipliers, return_to};
 pub(crate) use images::body_images;
 pub(crate) use improve::one_sided;
-pub(crate) use neighbours::Neighbours;
+pub(crate) use neighbours::{Kind, Neighbours};
 
 use super::datafile::{ExtraAttribute, Model, Representation};
 use crate::index::IndexVec;

@@ -10,6 +10,19 @@ pub(crate) struct Neighbours {
     pub(crate) facets: IndexVec<EdgeId, Vec<(FacetId, usize)>>,
     /// The edges at each vertex; a loop edge comes twice.
     pub(crate) edges: IndexVec<VertexId, Vec<EdgeId>>,
+    /// What each vertex lies on.
+    pub(crate) kinds: IndexVec<VertexId, Kind>,
+}
+
+/// What a vertex lies on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// No film.
+    Bare,
+    /// A film or its rim.
+    Film,
+    /// A line at which three or more films meet, or the end of such lines.
+    Line,
 }
 
 impl Neighbours {
@@ -28,7 +41,20 @@ impl Neighbours {
                 edges[end].push(id);
             }
         }
-        Self { facets, edges }
+        let mut kinds = IndexVec::from_elem(Kind::Bare, surface.vertices.len());
+        for (id, edge) in surface.edges.enumerated() {
+            let kind = match facets[id].len() {
+                0 => continue,
+                1 | 2 => Kind::Film,
+                _ => Kind::Line,
+            };
+            for vertex in edge.ends.into_iter().chain(edge.middle) {
+                if kinds[vertex] != Kind::Line {
+                    kinds[vertex] = kind;
+                }
+            }
+        }
+        Self { facets, edges, kinds }
     }
 
     /// The facets at a vertex, each once, in order.

@@ -10,6 +10,7 @@ use faer::{
     dyn_stack::{MemBuffer, MemStack},
     sparse::{
         SparseColMatRef, SymbolicSparseColMat,
+        linalg::SupernodalThreshold,
         linalg::cholesky::{
             CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
             factorize_symbolic_cholesky, supernodal::SupernodalLdltRef,
@@ -42,14 +43,14 @@ pub(crate) struct SymmetricFactor {
 /// Steps of iterative refinement: each gains the digits that pivoting would have saved.
 const REFINEMENTS: usize = 3;
 
-/// The residual, relative to the right side, at which a solution is as good as rounding lets it be.
-const REFINED: f64 = 1e-15;
+/// The residual, relative to the right side, at which a solution is good enough: Newton's next step takes out the rest.
+const REFINED: f64 = 1e-12;
 
 /// What is taken off a zero diagonal, as a part of the largest entry: refinement restores ten digits at a step.
 const SOFTENING: f64 = 1e-10;
 
-/// From this size on the factorization is worth more than one thread.
-const PARALLEL: usize = 20_000;
+/// From this size on fronts of several columns are faster than single columns.
+const FRONTS: usize = 2000;
 
 impl SymmetricPattern {
     /// The pattern of a matrix of `size` rows with entries at `(row, column)`, `row ≥ column`; repeated places are summed.
@@ -60,13 +61,13 @@ impl SymmetricPattern {
         let memory = FactorError::Memory { unknowns: size };
         let (starts, rows, places) = by_columns(size, &entries);
         let pattern = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
-        let cholesky = factorize_symbolic_cholesky(
-            pattern.as_ref(),
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|_| memory)?;
+        let mut parameters = CholeskySymbolicParams::default();
+        if size >= FRONTS {
+            parameters.supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SUPERNODAL;
+        }
+        let cholesky =
+            factorize_symbolic_cholesky(pattern.as_ref(), Side::Lower, SymmetricOrdering::Amd, parameters)
+                .map_err(|_| memory)?;
         Ok(Self { entries, places, pattern, cholesky, size })
     }
 
@@ -85,7 +86,8 @@ impl SymmetricPattern {
         for (&place, value) in self.places.iter().zip(entries) {
             matrix[place as usize] += value;
         }
-        let parallel = if self.size >= PARALLEL { Par::rayon(0) } else { Par::Seq };
+        // The fronts of sheets are small: several threads wait for each other longer than they work.
+        let parallel = Par::Seq;
         let mut values = vec![0.0; self.cholesky.len_val()];
         let scratch = self.cholesky.factorize_numeric_ldlt_scratch::<f64>(parallel, Default::default());
         let mut buffer = MemBuffer::try_new(scratch).map_err(|_| memory)?;
