@@ -44,6 +44,8 @@ impl Session {
     /// Takes contents along the edges' chords for good, as Surface Evolver does.
     pub fn keep_chords(&mut self) {
         self.contents = Contents::AlwaysChords;
+        // What was said of the walls does not hold.
+        self.told = super::routines::Told::default();
         self.problem = None;
     }
 
