@@ -410,7 +410,7 @@ mod tests {
     fn a_clear_blob_amid_the_comb_is_a_cell_wherever_it_lies() {
         let pitch = 10.0;
         let place = |column: usize, row: usize| {
-            let shift = if row % 2 == 0 { 0.0 } else { 0.5 };
+            let shift = if row.is_multiple_of(2) { 0.0 } else { 0.5 };
             DVec2::new(column as f64 + shift, row as f64 * 0.75_f64.sqrt()) * pitch + 40.0
         };
         let all = || (0..15).flat_map(|row| (0..15).map(move |column| (column, row)));
