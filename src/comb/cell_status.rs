@@ -16,10 +16,11 @@ const LEAST_CLOSURE: f64 = 0.85;
 const LEAST_RISE: f64 = 0.5;
 /// Greatest raggedness of an outline that was seen from wall to wall.
 const GREATEST_RAGGEDNESS: f64 = 0.22;
-/// Area of a cell of fewer than six sides, and of more, over that of a hexagon of the local pitch: 0.73 to 0.96 and 1.12 to
-/// 1.47 in the photographs with hand-checked truth, 0.80 to 1.00 and 1.02 to 1.18 (two in a hundred beyond) in synthetic ones.
+/// Area of a cell of fewer than six sides, and of more, over the median of its neighbours': on flat comb about 0.7 to 1 and 1
+/// to 1.5. Where the comb turns away from the camera cells shrink from one to the next, so that a seven may be smaller than
+/// the hexagons on its near side.
 const GREATEST_PENTAGON: f64 = 1.05;
-const LEAST_HEPTAGON: f64 = 0.98;
+const LEAST_HEPTAGON: f64 = 0.8;
 /// Chance that a side is right whose neighbour is hidden, and whose neighbour lies beyond the photograph, from synthetic
 /// photographs (analysis/comb_accuracy/calibration.csv).
 const HIDDEN_SIDE: f64 = 0.78;
@@ -82,12 +83,14 @@ fn is_shaped(evidence: &Evidence) -> bool {
     evidence.unevenness <= UNEVENNESS && evidence.raggedness <= GREATEST_RAGGEDNESS
 }
 
-/// Whether a cell has the size that goes with its number of sides: those of fewer than six are smaller than hexagons, those
-/// of more are larger. One that is not has got the pixels of a neighbour that was missed.
+/// Whether a cell has the size that goes with its number of sides beside its neighbours: those of fewer than six are smaller,
+/// those of more are larger. One that is not has got the pixels of a neighbour that was missed. The pitch is no measure of
+/// it: seen aslant, cells are as wide as ever one way.
 fn is_sized(reading: &Reading, cell: usize) -> bool {
-    let hexagon = reading.pitches[cell].powi(2) * 0.75_f64.sqrt();
-    let area = reading.regions[cell].area / hexagon;
-    if reading.counts[cell].neighbours.len() < 6 { area < GREATEST_PENTAGON } else { area > LEAST_HEPTAGON }
+    let neighbours = &reading.counts[cell].neighbours;
+    let whole = neighbours.iter().filter(|n| reading.kinds[**n] == Kind::Seen && !reading.cut[**n]);
+    let area = reading.regions[cell].area / median(whole.map(|n| reading.regions[*n].area));
+    if neighbours.len() < 6 { area < GREATEST_PENTAGON } else { area > LEAST_HEPTAGON }
 }
 
 /// Whether a place beyond the comb lies within the photograph, so that a cell there would have been seen.
