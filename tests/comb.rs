@@ -356,13 +356,16 @@ fn comb_that_turns_away_is_read_where_it_can_be_seen() -> TestResult {
             let cell = &read.pattern.cells[id];
             if cell.position.truncate().distance(*place) < 6.0 && cell.status == CellStatus::Complete {
                 read_truth += 1;
-                right += usize::from(cell.sides == Some(*sides));
+                right += usize::from(cell.sides.is_some_and(|read| read as usize == *sides));
             }
         }
         counted += read_truth;
         true_cells += truth.len();
     }
-    eprintln!("{right} of {counted} of {true_cells}");
+    // A wall between two cells may be a few pixels long, and then wrong once in a hundred cells.
+    assert!(right * 100 >= counted * 98, "{right} right of {counted}");
+    // Of a half ball seen from afar, 0.44 turns away by less than 56 degrees; its outer row has more oblique neighbours.
+    assert!(counted * 5 >= true_cells * 2, "{counted} complete of {true_cells}");
     Ok(())
 }
 
