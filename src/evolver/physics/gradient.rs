@@ -303,6 +303,7 @@ impl Problem {
                 }
             }
             EdgePart::Sliver(sliver) => sliver.add(factor, nodes, gradient, hessian),
+            EdgePart::Rim(rim) => rim.add(factor, nodes, gradient, hessian),
         }
     }
 
@@ -315,7 +316,8 @@ impl Problem {
     ) -> Vec<Share> {
         let places = places.as_slice();
         let facets = self.facets.par_chunks(CHUNK).map(|terms| {
-            let (mut local, mut share) = (Local::default(), Share::default());
+            let mut local = Local::default();
+            let mut share = Share::with_room(terms.iter().map(Term::nodes), directions);
             for term in terms {
                 if self.facet_local(term, places, weights, &mut local) {
                     share.add(&local, directions);
@@ -324,7 +326,8 @@ impl Problem {
             share
         });
         let edges = self.edges.par_chunks(CHUNK).map(|terms| {
-            let (mut local, mut share) = (Local::default(), Share::default());
+            let mut local = Local::default();
+            let mut share = Share::with_room(terms.iter().map(Term::nodes), directions);
             for term in terms {
                 self.edge_local(term, places, weights, &mut local);
                 share.add(&local, directions);

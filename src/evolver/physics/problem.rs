@@ -6,6 +6,7 @@ use super::{
     facet::FacetField,
     freedom::Hold,
     gradient::Slots,
+    rim::Rim,
     sliver::Sliver,
 };
 use crate::{
@@ -141,6 +142,8 @@ pub struct Problem {
     pub(super) rules: [Vec<CurvePoint>; 2],
     /// The edges along which contents are integrated, body by body.
     pub(super) contacts: Vec<Contact>,
+    /// Those whose slivers never count.
+    pub(super) kept_chords: Vec<Contact>,
     pub(super) strings: bool,
     /// Whether volumes are restored to a part of their shares, as quantities are, instead of absolutely.
     pub(crate) relative: bool,
@@ -148,12 +151,13 @@ pub struct Problem {
     pub(super) pattern: OnceLock<Slots>,
 }
 
-/// A field along edges, the gap at a convex wall, or the volume between an edge and its wall.
+/// A field along edges, the gap at a convex wall, the volume between an edge and its wall, or the film there.
 #[derive(Clone, Debug)]
 pub(super) enum EdgePart {
     Field(EdgeField),
     Gap(Bound),
     Sliver(Box<Sliver>),
+    Rim(Rim),
 }
 
 /// Energy and functionals of one set of places.
@@ -311,6 +315,11 @@ impl Problem {
                     EdgePart::Field(field) => field.value(rule, &moved[..nodes.len()]),
                     EdgePart::Gap(wall) => edge::gap(wall, &[nodes[0], nodes[nodes.len() - 1]]),
                     EdgePart::Sliver(sliver) => sliver.value(nodes)[0],
+                    EdgePart::Rim(rim) => {
+                        let area = rim.value(nodes);
+                        sums.area += area;
+                        area
+                    }
                 };
                 sums.add(part.destination, part.weight * value);
             }
