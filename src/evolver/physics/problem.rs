@@ -176,6 +176,9 @@ pub struct Values {
 /// Facets that one thread sums at a time: fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 2048;
 
+/// The same for edges, whose formulas take longer.
+pub(super) const EDGE_CHUNK: usize = 64;
+
 /// What a chunk adds up.
 struct Sums {
     energy: f64,
@@ -239,10 +242,10 @@ impl Problem {
         } else {
             self.facets.par_chunks(CHUNK).map(|chunk| self.facet_sums(chunk, places)).collect()
         };
-        let edges: Vec<Sums> = if self.edges.len() <= CHUNK {
+        let edges: Vec<Sums> = if self.edges.len() <= EDGE_CHUNK {
             vec![self.edge_sums(&self.edges, places)]
         } else {
-            self.edges.par_chunks(CHUNK).map(|chunk| self.edge_sums(chunk, places)).collect()
+            self.edges.par_chunks(EDGE_CHUNK).map(|chunk| self.edge_sums(chunk, places)).collect()
         };
         let mut points = Sums::new();
         for point in &self.points {

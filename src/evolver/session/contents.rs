@@ -193,7 +193,7 @@ impl Session {
 /// How far the nodes of a contact line may move, as a part of its edges, before its slivers are looked at again, and as a part
 /// of its size before volumes are compared again: both take longer than a Newton step.
 const NEARBY_EDGES: f64 = 0.05;
-const NEARBY_LINE: f64 = 0.01;
+const NEARBY_LINE: f64 = 0.05;
 
 /// Whether a contact line, by the ends of its edges, has moved by more than `limit`, or is another one.
 fn has_moved(before: &[[DVec3; 2]], now: &[[DVec3; 2]], limit: impl Fn(usize) -> f64) -> bool {
