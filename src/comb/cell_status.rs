@@ -16,11 +16,12 @@ const LEAST_CLOSURE: f64 = 0.85;
 const LEAST_RISE: f64 = 0.5;
 /// Greatest raggedness of an outline that was seen from wall to wall.
 const GREATEST_RAGGEDNESS: f64 = 0.22;
-/// Area of a cell of fewer than six sides, and of more, over the median of its neighbours': on flat comb about 0.7 to 1 and 1
-/// to 1.5. Where the comb turns away from the camera cells shrink from one to the next, so that a seven may be smaller than
-/// the hexagons on its near side.
+/// Area of a cell of fewer than six sides, and of more, over the mean of its neighbours': on flat comb about 0.7 to 1 and 1 to
+/// 1.5.
 const GREATEST_PENTAGON: f64 = 1.05;
 const LEAST_HEPTAGON: f64 = 0.8;
+/// Above this share of its neighbours' mean area a cell is two of which one was missed: a drone's cell among workers' has 1.5.
+const GREATEST_SIZE: f64 = 1.6;
 /// Chance that a side is right whose neighbour is hidden, and whose neighbour lies beyond the photograph, from synthetic
 /// photographs (analysis/comb_accuracy/calibration.csv).
 const HIDDEN_SIDE: f64 = 0.78;
@@ -29,6 +30,11 @@ const SIDE_BEYOND: f64 = 0.985;
 const HIDDEN_NEIGHBOURS: usize = 1;
 /// No reading is surer than this.
 const GREATEST_CONFIDENCE: f64 = 0.995;
+/// Comb seen more obliquely than this (longer over shorter axis of what a circle looks like: 1.8 at 56 degrees) hides cells behind
+/// others.
+const GREATEST_NARROWNESS: f64 = 1.8;
+/// Comb seen more obliquely than this is curved or far away: what is hidden there need not be as regular as what is seen.
+const TURNED: f64 = 1.3;
 /// A place beyond the comb that is this near to the border (in pitches) may be a cell of which little can be seen.
 const BORDER: f64 = 0.3;
 
@@ -57,8 +63,12 @@ fn standing(reading: &Reading, cell: usize, typical_rise: f64) -> Standing {
     let doubt = HIDDEN_SIDE.powi(saturating(hidden)) * SIDE_BEYOND.powi(saturating(beyond.len()));
     let confidence = (reading.counts[cell].confidence * doubt * evidence.closure).min(GREATEST_CONFIDENCE);
     // The place of a neighbour of which little is seen was inferred as if there were no defect: it cannot prove one.
-    let is_vague = |n: &usize| reading.slivers[*n] || !reading.cut[*n] && !is_shaped(&reading.evidence[*n]);
+    let is_vague = |n: &usize| {
+        let is_whole = || is_shaped(&reading.evidence[*n]) && size(reading, *n) < GREATEST_SIZE;
+        reading.slivers[*n] || !reading.cut[*n] && !is_whole()
+    };
     let vague = of_kind(Kind::Seen).filter(|n| is_vague(n)).count();
+    let narrowness = narrowness(reading, cell);
     let (odd, unseen) = (neighbours.len() != 6, hidden + beyond.len() + vague);
     let status = if reading.kinds[cell] != Kind::Seen {
         CellStatus::Uncertain
@@ -66,7 +76,9 @@ fn standing(reading: &Reading, cell: usize, typical_rise: f64) -> Standing {
         CellStatus::Cut
     } else if confidence < LEAST_CONFIDENCE
         || !is_plain(evidence, typical_rise)
-        || (odd && (unseen > 0 || !is_sized(reading, cell)))
+        || narrowness > GREATEST_NARROWNESS
+        || (unseen > 0 && (odd || narrowness > TURNED))
+        || (odd && !is_sized(reading, cell))
     {
         CellStatus::Uncertain
     } else {
@@ -83,14 +95,27 @@ fn is_shaped(evidence: &Evidence) -> bool {
     evidence.unevenness <= UNEVENNESS && evidence.raggedness <= GREATEST_RAGGEDNESS
 }
 
-/// Whether a cell has the size that goes with its number of sides beside its neighbours: those of fewer than six are smaller,
-/// those of more are larger. One that is not has got the pixels of a neighbour that was missed. The pitch is no measure of
-/// it: seen aslant, cells are as wide as ever one way.
+/// How obliquely a cell or the most oblique one beside it is seen.
+fn narrowness(reading: &Reading, cell: usize) -> f64 {
+    let whole = |n: &&usize| reading.kinds[**n] == Kind::Seen && !reading.cut[**n];
+    let beside = reading.counts[cell].neighbours.iter().filter(whole);
+    beside.map(|n| reading.evidence[*n].narrowness()).fold(reading.evidence[cell].narrowness(), f64::max)
+}
+
+/// Whether a cell has the size that goes with its number of sides: those of fewer than six are smaller than their neighbours,
+/// those of more are larger. One that is not has got the pixels of a neighbour that was missed.
 fn is_sized(reading: &Reading, cell: usize) -> bool {
-    let neighbours = &reading.counts[cell].neighbours;
-    let whole = neighbours.iter().filter(|n| reading.kinds[**n] == Kind::Seen && !reading.cut[**n]);
-    let area = reading.regions[cell].area / median(whole.map(|n| reading.regions[*n].area));
-    if neighbours.len() < 6 { area < GREATEST_PENTAGON } else { area > LEAST_HEPTAGON }
+    let size = size(reading, cell);
+    if reading.counts[cell].neighbours.len() < 6 { size < GREATEST_PENTAGON } else { size > LEAST_HEPTAGON }
+}
+
+/// Area of a cell over the mean of its neighbours'. The pitch is no measure of it: seen obliquely, cells are as wide as ever one
+/// way. Where they shrink from one to the next, the larger ones on one side make up for the smaller ones on the other.
+fn size(reading: &Reading, cell: usize) -> f64 {
+    let whole = |n: &&usize| reading.kinds[**n] == Kind::Seen && !reading.cut[**n];
+    let areas = reading.counts[cell].neighbours.iter().filter(whole).map(|n| reading.regions[*n].area);
+    let (sum, count) = areas.fold((0.0, 0.0), |(sum, count), area| (sum + area, count + 1.0));
+    if sum > 0.0 { reading.regions[cell].area * count / sum } else { 1.0 }
 }
 
 /// Whether a place beyond the comb lies within the photograph, so that a cell there would have been seen.

@@ -1,7 +1,13 @@
 //! What the photograph shows of each cell: rays from its centre to its wall.
 
-use super::{plane::Plane, watershed::Segmentation};
-use glam::DVec2;
+use super::{
+    ellipse::{half_width, narrowness, unit},
+    grid::Grid,
+    kinds::median,
+    plane::Plane,
+    watershed::Segmentation,
+};
+use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 /// Rays per cell.
@@ -12,6 +18,10 @@ const WALL_WINDOW: f64 = 0.1;
 const LAST_PIXELS: f64 = 1.0;
 /// A ray meets a wall if the relief rises by at least this from the cell's inside; a typical wall rises by 1.5 to 2.
 const WALL_RISE: f64 = 0.55;
+
+/// Cells this near (in pitches), whose outlines are seen, tell how obliquely a cell is seen.
+const AROUND: f64 = 1.3;
+const LEAST_CLOSURE: f64 = 0.85;
 
 /// What the rays of one cell say.
 #[derive(Clone, Debug)]
@@ -30,10 +40,33 @@ pub(crate) struct Evidence {
     pub(crate) contrast: f64,
     /// Share of the middle that is clearly lower than the wall.
     pub(crate) openness: f64,
-    /// Standard deviation of the distances to the rim over their mean: about 0.06 for a hexagonal opening.
+    /// Standard deviation of the distances to the rim over their mean, each in units of what a circle's would be
+    /// there: about 0.06 for a hexagonal opening, however obliquely it is seen.
     pub(crate) unevenness: f64,
     /// The same of the distances to the region's edge.
     pub(crate) raggedness: f64,
+    /// The matrix of the squares of the half axes of the ellipse that has the outline's second moments, in pixels of the raster.
+    pub(crate) ellipse: DMat2,
+    /// What circles look like here, as such a matrix of determinant 1: the mean shape of the cells around.
+    pub(crate) view: DMat2,
+    /// Distance to the rim along the rays that have one.
+    rims: Vec<(usize, f64)>,
+}
+
+impl Evidence {
+    /// Measures how regular the outlines are where circles look like `view`.
+    fn look(&mut self, view: DMat2) {
+        self.view = view;
+        let widths: [f64; RAYS] = std::array::from_fn(|ray| half_width(view, direction(ray)));
+        self.unevenness = spread(self.rims.iter().map(|(ray, length)| length / widths[*ray]));
+        self.raggedness = spread(self.radii.iter().zip(widths).map(|(length, width)| length / width));
+    }
+
+    /// How much longer than wide cells around are: 1 if they are seen from above, the secant of the angle if they are seen
+    /// obliquely.
+    pub(crate) fn narrowness(&self) -> f64 {
+        narrowness(self.view)
+    }
 }
 
 /// The rasters that the rays look at.
@@ -58,10 +91,21 @@ pub(crate) fn gather(
     insides: &[f64],
     pitches: &[f64],
 ) -> Vec<Evidence> {
-    (0..centres.len())
-        .into_par_iter()
-        .map(|cell| of_cell(rasters, cell, centres[cell], insides[cell], pitches[cell]))
-        .collect()
+    let count = centres.len();
+    let alone = |cell| of_cell(rasters, cell, centres[cell], insides[cell], pitches[cell]);
+    let mut all: Vec<Evidence> = (0..count).into_par_iter().map(alone).collect();
+    let grid = Grid::of(centres, median(pitches.iter().copied()).max(1.0));
+    let view = |cell: usize| {
+        let near = grid.within(centres[cell], AROUND * pitches[cell]).map(|(other, _)| &all[other]);
+        let shapes =
+            near.filter(|e| e.visible == 1.0 && e.closure >= LEAST_CLOSURE).filter_map(|e| unit(e.ellipse));
+        unit(shapes.sum::<DMat2>()).unwrap_or(DMat2::IDENTITY)
+    };
+    let views: Vec<DMat2> = (0..count).into_par_iter().map(view).collect();
+    for (evidence, view) in all.iter_mut().zip(views) {
+        evidence.look(view);
+    }
+    all
 }
 
 fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch: f64) -> Evidence {
@@ -86,7 +130,7 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
         let crest = centre + step * crest;
         contrast += f64::from(rasters.wallness.sample(crest.x, crest.y)) - middle_raw;
         closed += f64::from(u8::from(height > WALL_RISE));
-        rims.push(rim(rasters.relief, centre, step, radius, inside + 0.5 * height));
+        rims.push((ray, rim(rasters.relief, centre, step, radius, inside + 0.5 * height)));
     }
     let rays = (rims.len() as f64).max(1.0);
     let (closed, rise, contrast) = (closed / rays, rise / rays, contrast / rays);
@@ -98,16 +142,31 @@ fn of_cell(rasters: &Rasters<'_>, cell: usize, centre: DVec2, inside: f64, pitch
         rise,
         contrast,
         openness: openness(rasters.relief, centre, pitch, inside + 0.5 * rise),
-        unevenness: spread(&rims),
-        raggedness: spread(&radii),
+        ellipse: ellipse(&radii),
+        rims,
+        view: DMat2::IDENTITY,
+        unevenness: 0.0,
+        raggedness: 0.0,
     }
 }
 
+/// The ellipse with the second moments of the outline, as the matrix of its half axes' squares.
+fn ellipse(radii: &[f64; RAYS]) -> DMat2 {
+    let (mut area, mut moments) = (0.0, DMat2::ZERO);
+    for (ray, radius) in radii.iter().enumerate() {
+        let step = direction(ray);
+        area += radius.powi(2) / 2.0;
+        moments += DMat2::from_cols(step * step.x, step * step.y) * (radius.powi(4) / 4.0);
+    }
+    // An ellipse's second moments over its area are a quarter of its half axes' squares.
+    moments * (4.0 / f64::max(area, f64::MIN_POSITIVE))
+}
+
 /// Standard deviation over mean.
-fn spread(lengths: &[f64]) -> f64 {
-    let count = (lengths.len() as f64).max(1.0);
-    let mean = lengths.iter().sum::<f64>() / count;
-    let variance = lengths.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / count;
+fn spread(lengths: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = (lengths.clone().count() as f64).max(1.0);
+    let mean = lengths.clone().sum::<f64>() / count;
+    let variance = lengths.map(|r| (r - mean) * (r - mean)).sum::<f64>() / count;
     variance.sqrt() / mean.max(1e-9)
 }
 

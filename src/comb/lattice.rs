@@ -151,18 +151,20 @@ pub(crate) struct Site {
     pub(crate) clear: bool,
     /// Whether a person says that there is a cell.
     pub(crate) by_hand: bool,
+    /// Its least width over that of a cell of the local pitch: less than 1 where it is seen obliquely.
+    pub(crate) width: f64,
     /// Whether a person says that there is none: its pixels are then taken from all cells.
     pub(crate) removed: bool,
 }
 
 impl Site {
-    const fn new(position: DVec2, depth: usize) -> Self {
-        Self { position, depth, clear: false, by_hand: false, removed: false }
+    pub(crate) const fn new(position: DVec2, depth: usize) -> Self {
+        Self { position, depth, clear: false, by_hand: false, width: 1.0, removed: false }
     }
 
     /// A cell that a person has added.
     pub(crate) const fn by_hand(position: DVec2) -> Self {
-        Self { position, depth: 0, clear: false, by_hand: true, removed: false }
+        Self { position, depth: 0, clear: false, by_hand: true, width: 1.0, removed: false }
     }
 
     /// Whether a blob was seen here, and no person says otherwise.

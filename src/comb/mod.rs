@@ -10,6 +10,7 @@
 //! | find the pitch: the scale at which most of the photograph is a hexagonal lattice | `pitch.rs`, `peaks.rs` |
 //! | level the light; learn the colour of walls against that of cells | `light.rs`, `smooth.rs` |
 //! | find the cells: blobs that continue a lattice, clear ones amid it, hidden cells inferred between them | `survey.rs`, `lattice.rs`, `grid.rs` |
+//! | find cells that are seen obliquely, and so are narrower than the lattice allows | `openings.rs`, `ellipse.rs` |
 //! | share the pixels among the cells: watershed on the walls | `watershed.rs`, `terrain.rs` |
 //! | measure each cell and each wall; seen, hidden, or beyond the comb | `walls.rs`, `evidence.rs`, `kinds.rs` |
 //! | count sides by walls and by Delaunay neighbours, decide, say how sure | `sides.rs`, `triangulation.rs`, `cell_status.rs` |
@@ -21,7 +22,8 @@
 //! A cell is *complete* if its whole outline is seen. At the border of the photograph its neighbours may be cut, and even a
 //! neighbour of which nothing is seen counts as one side, since the wall towards it is seen; at the edge of the comb and
 //! beside caps a cell is *cut*, except that a single hidden neighbour, enclosed by cells that are seen, counts as one side.
-//! This is what keeps false fives and sevens away from the edges.
+//! This is what keeps false fives and sevens away from the edges. Where comb turns away from the camera by more than 56 degrees
+//! cells hide behind one another, and counts are uncertain.
 //!
 //! Not promised: cells smaller than 11 pixels are refused; caps are not told from other covers; nothing is measured in
 //! depth; contents of cells are not recognised.
@@ -33,11 +35,13 @@
 mod cell_status;
 mod comb_pattern;
 mod corrections;
+mod ellipse;
 mod evidence;
 mod grid;
 mod kinds;
 mod lattice;
 mod light;
+mod openings;
 mod peaks;
 mod photo;
 mod pitch;

@@ -1,10 +1,11 @@
 //! From photograph to cells: the steps in order.
 
 use super::{
-    CorrectionError, Settings,
+    CorrectionError, Settings, ellipse,
     evidence::{self, Evidence, Rasters},
     kinds::{self, Kind, median},
     lattice::Site,
+    openings,
     photo::Part,
     pitch::PitchEstimate,
     plane::{Plane, pixel},
@@ -15,7 +16,7 @@ use super::{
     walls::{self, Region, Wall},
     watershed::{self, Marker, Segmentation},
 };
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 /// Pixels per pitch that the reading works at: larger photographs are reduced to it. At 36 a wall of a tenth of the pitch
@@ -117,6 +118,7 @@ pub(crate) fn read(
     let pitch = estimate.pitch * scale;
     let part = pyramid.part();
     let mut survey = survey(pyramid, estimate.polarity, scale, pitch);
+    add_missed(&mut survey, pitch);
     let origin = DVec2::new(part.left as f64, part.top as f64);
     let to_raster = |point: DVec2| (point - origin) * scale;
     settings.corrections.place(&mut survey.sites, to_raster, pitch)?;
@@ -129,6 +131,25 @@ pub(crate) fn read(
     let joined = settings.corrections.joined(&survey.sites, to_raster, pitch)?;
     let segmented = segment(&survey, pitch, hidden.as_deref(), &joined);
     Ok(count(&survey, segmented, scale))
+}
+
+/// Adds the cells that the lattice missed because they are seen obliquely. Half the resolution is enough to find them.
+fn add_missed(survey: &mut Survey, pitch: f64) {
+    let coarse = coarse(&survey.relief.blurred(RELIEF_BLUR * pitch));
+    let unit = COARSE as f64;
+    let positions: Vec<DVec2> = survey.sites.iter().map(|site| site.position / unit).collect();
+    let local = |place: DVec2| survey.field.at(place * unit) / unit;
+    let missed = openings::missed(&coarse, &survey.sites, &positions, local);
+    for site in missed.replaced.into_iter().rev() {
+        survey.sites.remove(site);
+    }
+    let cells = missed.cells.into_iter();
+    survey.sites.extend(cells.map(|(place, width)| Site { width, ..Site::new(place * unit, 0) }));
+}
+
+fn coarse(relief: &Plane) -> Plane {
+    let fill = |y: usize, row: &mut [f32]| row.copy_from_slice(relief.row(y));
+    smooth::reduced(relief.width(), relief.height(), COARSE, fill)
 }
 
 /// Which pixels of the raster the mask or a correction hides.
@@ -161,7 +182,8 @@ struct Segmented {
 fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usize, usize)]) -> Segmented {
     let relief = survey.relief.blurred(RELIEF_BLUR * pitch);
     let mut centres: Vec<DVec2> = survey.sites.iter().map(|s| s.position).collect();
-    let pitches: Vec<f64> = centres.iter().map(|c| survey.field.at(*c)).collect();
+    let pitches: Vec<f64> =
+        survey.sites.iter().map(|site| site.width * survey.field.at(site.position)).collect();
     centre(&mut centres, survey, &relief, &pitches, hidden);
     let mut segmentation = watershed::flood(&relief, &marked(&centres, &pitches, &survey.sites), hidden);
     let regions = walls::regions(&segmentation, &relief, &centres, &pitches);
@@ -200,10 +222,9 @@ fn marked(centres: &[DVec2], pitches: &[f64], sites: &[Site]) -> Vec<Marker> {
 
 /// Moves the cells that were found to the middle of what a first flood gives them. Half the resolution is enough for that.
 fn centre(centres: &mut [DVec2], survey: &Survey, relief: &Plane, pitches: &[f64], hidden: Option<&[bool]>) {
-    let (width, fill) = (relief.width(), |y: usize, row: &mut [f32]| row.copy_from_slice(relief.row(y)));
-    let coarse = smooth::reduced(width, relief.height(), COARSE, fill);
+    let coarse = coarse(relief);
     let hidden: Option<Vec<bool>> = hidden.map(|hidden| {
-        let at = |i: usize| COARSE * (i / coarse.width() * width + i % coarse.width());
+        let at = |i: usize| COARSE * (i / coarse.width() * relief.width() + i % coarse.width());
         (0..coarse.width() * coarse.height()).map(|i| hidden[at(i)]).collect()
     });
     let unit = COARSE as f64;
@@ -286,7 +307,17 @@ fn count(survey: &Survey, segmented: Segmented, scale: f64) -> Reading {
         *centre = markers[index];
     }
     let slivers: Vec<bool> = evidence.iter().map(|e| e.visible < HALF_SEEN).collect();
-    let cells = Cells { centres: &centres, pitches: &pitches, kinds: &kinds, cut: &cut, slivers: &slivers };
+    let is_whole = |i: usize| kinds[i] == Kind::Seen && !cut[i];
+    let shape = |i: usize| is_whole(i).then(|| ellipse::unit(evidence[i].ellipse)).flatten();
+    let shapes: Vec<Option<DMat2>> = (0..centres.len()).map(shape).collect();
+    let cells = Cells {
+        centres: &centres,
+        pitches: &pitches,
+        kinds: &kinds,
+        cut: &cut,
+        slivers: &slivers,
+        shapes: &shapes,
+    };
     let counts = sides::count(&cells, &walls);
     let size = DVec2::new(relief.width() as f64, relief.height() as f64);
     Reading { scale, centres, regions, walls, evidence, kinds, cut, slivers, counts, pitches, size }

@@ -6,11 +6,12 @@
 //! Their weighted mean decides, and its size says how sure that is.
 
 use super::{
+    ellipse::{narrowness, unit, upright},
     kinds::Kind,
     triangulation::{Delaunay, Edge, voronoi_length},
     walls::Wall,
 };
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Error of a decided length, in pitches, from walls counted by eye and from synthetic photographs: the chance that a
@@ -35,6 +36,8 @@ pub(crate) struct Cells<'a> {
     pub(crate) cut: &'a [bool],
     /// Whether so little of the cell is seen that its walls do not tell.
     pub(crate) slivers: &'a [bool],
+    /// The shape of a cell that is seen as a whole: the matrix of its ellipse's half axes' squares, of determinant 1.
+    pub(crate) shapes: &'a [Option<DMat2>],
 }
 
 /// The count of one cell.
@@ -71,15 +74,37 @@ pub(crate) fn count(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>) -
     counts
 }
 
+/// How four cells are seen.
+struct View {
+    /// What makes the comb as it would be seen from above, leaving areas as they are.
+    upright: DMat2,
+    /// How much smaller that is than comb seen from above.
+    shrinkage: f64,
+}
+
+impl View {
+    fn of(cells: &Cells<'_>, four: [usize; 4]) -> Self {
+        let shape = unit(four.iter().filter_map(|i| cells.shapes[*i]).sum()).unwrap_or(DMat2::IDENTITY);
+        // The longer half axis is a circle's radius, the geometric mean of both is what remains of it.
+        Self { upright: upright(shape), shrinkage: narrowness(shape).sqrt().recip() }
+    }
+}
+
 fn quads(cells: &Cells<'_>, walls: &BTreeMap<(usize, usize), Wall>, delaunay: &[Edge]) -> Vec<Quad> {
-    let wall = |a: usize, b: usize| walls.get(&(a.min(b), a.max(b))).map_or(0.0, |w| w.length);
     let mut quads = Vec::new();
     for edge in delaunay {
         let [Some(c), Some(d)] = edge.thirds else { continue };
-        let Some(voronoi) = voronoi_length(cells.centres, edge) else { continue };
         let (a, b) = edge.ends;
         let four = [a, b, c, d];
-        let pitch = four.iter().map(|i| cells.pitches[*i]).sum::<f64>() / 4.0;
+        let view = View::of(cells, four);
+        let [p, q, r, s] = four.map(|i| view.upright * cells.centres[i]);
+        let Some(voronoi) = voronoi_length([p, q], [r, s]) else { continue };
+        let pitch = view.shrinkage * four.iter().map(|i| cells.pitches[*i]).sum::<f64>() / 4.0;
+        let wall = |a: usize, b: usize| {
+            let along = (cells.centres[b] - cells.centres[a]).perp().normalize_or_zero();
+            let seen = walls.get(&(a.min(b), a.max(b))).map_or(0.0, |w| w.length);
+            seen * (view.upright * along).length()
+        };
         let all_seen = four.iter().all(|i| cells.kinds[*i] == Kind::Seen && !cells.slivers[*i]);
         let any_cut = four.iter().any(|i| cells.cut[*i]);
         let wall_weight = if all_seen { 1.0 } else { HIDDEN_WALL_WEIGHT };

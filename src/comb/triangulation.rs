@@ -113,13 +113,12 @@ impl Delaunay {
     }
 }
 
-/// Length of the Voronoi edge across an edge: the distance of the circumcentres on both sides; `None` at the hull.
-pub(crate) fn voronoi_length(points: &[DVec2], edge: &Edge) -> Option<f64> {
-    let [Some(c), Some(d)] = edge.thirds else { return None };
-    let (a, b) = (points[edge.ends.0], points[edge.ends.1]);
-    let one = circumcentre(a, b, points[c])?;
-    let two = circumcentre(a, b, points[d])?;
-    Some(one.distance(two))
+/// Length of the Voronoi edge between two points that have two others on either side: the distance of the circumcentres, negative
+/// if it is the others that touch; `None` where three are in line.
+pub(crate) fn voronoi_length([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Option<f64> {
+    let across = (b - a).perp().normalize_or_zero();
+    let length = (circumcentre(a, b, c)? - circumcentre(a, b, d)?).dot(across);
+    Some(if (c - a).dot(across) > 0.0 { length } else { -length })
 }
 
 /// Centre of the circle through three points; `None` where they are in line.

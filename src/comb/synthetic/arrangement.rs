@@ -187,7 +187,9 @@ impl Arrangement {
     fn near_misses(&self, edges: &[Edge]) -> Vec<f64> {
         let mut least = vec![f64::INFINITY; self.centres.len()];
         for edge in edges {
-            if let Some(length) = voronoi_length(&self.centres, edge) {
+            let [Some(c), Some(d)] = edge.thirds else { continue };
+            let at = |cell: usize| self.centres[cell];
+            if let Some(length) = voronoi_length([edge.ends.0, edge.ends.1].map(at), [c, d].map(at)) {
                 for third in edge.across() {
                     least[third] = least[third].min(length);
                 }
