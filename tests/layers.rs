@@ -8,7 +8,7 @@ use combwright::foam::{
         Arrangement, Division, LayerSettings, Layers, NoLayers, corner_angles, layer_figures, plane_end,
         relaxed, sheets, tetrahedral_angle,
     },
-    relax::{DescentStep, Ending},
+    relax::{Descent, DescentStep, Ending},
     setup::FoamSpace,
 };
 use combwright::report::layers::picture;
@@ -125,6 +125,23 @@ fn layers_annealed_for_themselves_come_to_balance() -> Result<(), NoLayers> {
     // Both named arrangements are foams of the same cells; annealed ones may lie above them, but not far.
     let best = flat(Arrangement::Toth, 1)?.energy;
     assert!((best * 0.9999..best * 1.02).contains(&layers.energy), "{} {best}", layers.energy);
+    Ok(())
+}
+
+#[test]
+fn layers_between_spheres_come_to_a_balance_that_is_a_minimum() -> Result<(), NoLayers> {
+    // The outer wall's cells are sixteen times as large as the inner wall's.
+    let layers = made(&FoamSpace::Sphere { radii: [1.0, 4.0] }, Arrangement::Annealed, 24, 1)?;
+    assert_lawful(&layers, 12.0);
+    // Slivers that hold up the others' steps would take four times as many.
+    assert!(layers.descended.steps < 60, "{:?}", layers.descended);
+    let cells = layers.division.seeds.len();
+    let wanted = (0..cells).map(|cell| layers.division.volumes[usize::from(!layers.division.is_lower(cell))]);
+    let (complex, places) = (layers.films.complex.clone(), layers.places().clone());
+    // Rotations, along which the energy is constant, are held.
+    let descent = Descent::new(complex, wanted.collect(), places, layers.pressures.clone()).unwrap();
+    let lowest = descent.lowest_mode().unwrap().eigenvalue;
+    assert!(lowest > 1e-6, "{lowest}");
     Ok(())
 }
 

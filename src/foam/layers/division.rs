@@ -72,8 +72,10 @@ pub struct Division {
 const REACH: f64 = 5.0;
 /// The cube that cells are cut from, in spacings.
 const CUBE: f64 = 4.0;
-/// Corners nearer to each other than this part of the spacing are one.
-const JOINED: f64 = 1e-5;
+/// Corners nearer to each other than this part of the spacing are one: those of rows, where more than four cells meet, come out
+/// equal to 1e-11 from each cell. Far above that, a corner that lies near a wall by chance would be joined with where its own
+/// borders meet the wall, to a corner of five bodies that no change of topology can part.
+const JOINED: f64 = 1e-8;
 
 /// One face of a cell as it is left by the walls.
 struct Cut {

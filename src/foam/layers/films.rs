@@ -240,9 +240,7 @@ impl<'a> Builder<'a> {
     fn triangles(&mut self, sides: &[Vec<NodeImage>], patch: &Patch) -> Vec<Element> {
         let count = sides.len();
         let centre = self.inner(patch, patch.centre);
-        let spokes: Vec<NodeImage> = (0..count)
-            .map(|k| self.inner(patch, patch.at(k * 2 * self.half).lerp(patch.centre, 0.5)))
-            .collect();
+        let spokes: Vec<NodeImage> = (0..count).map(|k| self.spoke(patch, k * 2 * self.half)).collect();
         let nodes = |k: usize| {
             vec![sides[k][0], sides[k][2], centre, sides[k][1], spokes[(k + 1) % count], spokes[k]]
         };
@@ -304,8 +302,20 @@ impl<'a> Builder<'a> {
             .collect()
     }
 
+    /// Half way from a node of the rim to the middle. It follows both, so that spokes stay straight in their film and no
+    /// triangle folds where a short side grows.
+    fn spoke(&mut self, patch: &Patch, rim: usize) -> NodeImage {
+        let mut weights = patch.weights(patch.centre);
+        weights.iter_mut().for_each(|weight| *weight *= 0.5);
+        weights[rim] += 0.5;
+        self.inner_of(patch, weights)
+    }
+
     fn inner(&mut self, patch: &Patch, at: DVec2) -> NodeImage {
-        let weights = patch.weights(at);
+        self.inner_of(patch, patch.weights(at))
+    }
+
+    fn inner_of(&mut self, patch: &Patch, weights: Vec<f64>) -> NodeImage {
         let drawn = || weights.iter().zip(&patch.places).map(|(&w, &p)| w * p).sum();
         let place = self.kept.pop().unwrap_or_else(drawn);
         let masters = patch.nodes.iter().zip(weights).map(|(image, w)| (image.node, w)).collect();

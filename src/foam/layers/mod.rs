@@ -8,6 +8,7 @@
 //! | two sheets of seeds: rhombic, Tóth's, or annealed on both sides | `arrangement.rs` |
 //! | annealed sheets settle together: plane films between power cells, of least area at equal volumes | `settle.rs`, `plane_films.rs` |
 //! | their power cells, cut off by the walls; corners, polygons | `division.rs` |
+//! | slivers among their sides opened | `open.rs` |
 //! | the film complex: each polygon as curved quadrilaterals round its middle | `films.rs` |
 //! | the descent to least energy at equal volumes | `relax.rs` |
 //! | borders and films that vanish: changes of topology | `flip/` |
@@ -21,8 +22,7 @@
 //!
 //! Not promised: balance. A change that would take a cell to the other wall, away from its own, or to a second film with a
 //! neighbour is not made, nor one at corners where more than four cells meet, as in the bees' arrangement; a foam that needs it
-//! ends as stalled, with the borders that vanish. Between curved walls, where one wall's cells are much narrower than the
-//! other's, short borders hold up the descent.
+//! ends as stalled, with the borders that vanish.
 //!
 //! Sources: L. Fejes Tóth, "What the bees know and what they do not know", Bull. Amer. Math. Soc. 70 (1964); D. Weaire and
 //! R. Phelan, "Optimal design of honeycombs", Nature 367 (1994), who made both arrangements in foam between glass plates.
@@ -34,6 +34,7 @@ mod ends;
 mod figures;
 mod films;
 mod flip;
+mod open;
 mod plane_films;
 mod relax;
 mod settle;

@@ -5,6 +5,7 @@ use super::{
     films::{Side, films_after, films_refined},
     flip::{Cluster, Moves},
     layer_films,
+    open::open,
 };
 use crate::foam::{
     complex::{NodeId, NodeImage, Places, RegionId},
@@ -79,10 +80,13 @@ const VANISHING: f64 = 0.05;
 const VANISHED: f64 = 0.004;
 /// A triangle beside such a border becomes a border if all its sides are below this part: longer ones first shrink.
 const SMALL_FILM: f64 = 0.15;
-/// Steps of which less than this part could be taken are held up by slivers: then sides of triple that length go, shrinking or
-/// not.
+/// Steps of which less than this part could be taken are held up by slivers: then these go, shrinking or not, and sides of
+/// triple [`VANISHING`] that shrink.
 const HELD_UP: f64 = 0.05;
 const HELD_UP_BY: f64 = 3.0;
+/// Sides below this part of the spacing are slivers: they are opened to that length before films are laid anew, and go if
+/// steps are held up. It lies below [`VANISHING`], so that what goes on shrinking changes the topology in the next steps.
+const SLIVER: f64 = 0.03;
 /// So many such steps on end, with nothing to go, and the films are laid anew; at most so often.
 const MOST_HELD_UP: usize = 4;
 const MOST_SPREADS: usize = 12;
@@ -105,8 +109,13 @@ pub fn relaxed(
     settings: &LayerSettings,
     progress: &mut dyn FnMut(&DescentStep<'_>) -> ControlFlow<()>,
 ) -> Result<Layers, NoLayers> {
-    let films = layer_films(&division, gap, FIRST_FINENESS);
+    let mut films = layer_films(&division, gap, FIRST_FINENESS);
     let first_energy = energy(&films.complex, &films.places);
+    let mut division = division;
+    if settings.changes_topology {
+        open(&mut division, gap, SLIVER * settings.spacing);
+        films = layer_films(&division, gap, FIRST_FINENESS);
+    }
     let mut run = Run {
         gap,
         settings,
@@ -225,7 +234,8 @@ impl Run<'_> {
             let sides = self.films.borders.keys().filter(gone).copied().collect();
             return Vanishing { sides, small, stuck: false };
         }
-        let short = |side: &Side, length: f64| length < limit && (held_up || length < before[side]);
+        let sliver = |length: f64| held_up && length < SLIVER * self.settings.spacing;
+        let short = |side: &Side, length: f64| length < limit && (length < before[side] || sliver(length));
         let exhausted = self.flips >= MOST_FLIPS * self.division.seeds.len();
         if exhausted || !now.iter().any(|(side, &length)| short(side, length)) {
             return Vanishing::default();
@@ -285,10 +295,13 @@ impl Run<'_> {
         done > 0
     }
 
-    /// Lays the films anew between their corners, every other time between their borders: elements that are about to fold open.
-    /// Gives whether this may help yet.
+    /// Lays the films anew between their corners, every other time between their borders: elements that are about to fold open,
+    /// and so do slivers where topology may change. Gives whether this may help yet.
     fn spread(&mut self) -> bool {
         self.spreads += 1;
+        if self.settings.changes_topology {
+            open(&mut self.division, self.gap, SLIVER * self.settings.spacing);
+        }
         self.films = if self.spreads.is_multiple_of(2) {
             films_refined(&self.division, self.gap, self.fineness, &self.films)
         } else {

@@ -34,6 +34,7 @@ use layout::{Layout, lower_pairs};
 use motion::{Frames, Motions};
 use rayon::prelude::*;
 use sparse::{Factored, Symbolic};
+use std::sync::atomic::{AtomicI32, Ordering};
 
 /// The system of one complex: everything that changes only with its topology.
 #[derive(Debug)]
@@ -41,6 +42,9 @@ pub struct System {
     layout: Layout,
     symbolic: Symbolic,
     frames: Frames,
+    /// How far the last Hessian that was not positive had to be stiffened: the next one's search starts there. Where it starts
+    /// has no part in what it finds.
+    last_stage: AtomicI32,
 }
 
 /// How far a state is from equilibrium.
@@ -93,7 +97,7 @@ const MARGIN: f64 = 2.0;
 /// factors are too large for it to help.
 const SOFTENING: f64 = 1e-9;
 /// Stiffenings before giving up: at 10⁵ γ a step is no longer a step.
-const SHIFTS: i32 = 15;
+const SHIFTS: i32 = 14;
 
 impl System {
     /// The system of `complex` with frames taken at `places`.
@@ -103,7 +107,7 @@ impl System {
     pub fn new(complex: &Complex, places: &Places) -> Result<Self, FactorError> {
         let layout = Layout::new(complex, places);
         let symbolic = Symbolic::new(&layout)?;
-        Ok(Self { layout, symbolic, frames: Frames::new(complex, places) })
+        Ok(Self { layout, symbolic, frames: Frames::new(complex, places), last_stage: AtomicI32::new(0) })
     }
 
     /// Takes the frames anew at `places`.
@@ -248,8 +252,8 @@ impl System {
         Ok(Step { direction, balance, displacements, own_displacements, residuals, unstable, shift })
     }
 
-    /// Stiffens the Hessian from `damping` on until it is positive on the constraints and `accept` takes its factors. Gives
-    /// the directions of negative curvature of the Hessian as it is, and the stiffening.
+    /// Stiffens the Hessian from `damping` on, as little as the growth allows, until it is positive on the constraints and
+    /// `accept` takes its factors. Gives the directions of negative curvature of the Hessian as it is, and the stiffening.
     fn stiffened(
         &self,
         assembled: &[FilmHessian],
@@ -257,29 +261,56 @@ impl System {
         damping: f64,
         mut accept: impl FnMut(&Factored<'_>, &[FilmSystem]) -> bool,
     ) -> Result<(usize, f64), FactorError> {
-        let mut shift = damping;
-        let mut unstable = None;
-        let mut stiff = false;
-        for attempt in 0..SHIFTS {
-            let films = self.condense(assembled, shift);
-            let softening = self.softening(&films);
-            let entries = self.entries(&films, walls, shift);
-            let factored = Factored::new(&self.layout, &self.symbolic, entries, &softening);
-            let inner: usize = films.iter().map(|film| film.negative).sum();
-            let extra =
-                factored.as_ref().map_or(1, |f| (f.negative + inner).saturating_sub(self.layout.pressures));
-            unstable.get_or_insert(extra);
-            let found = extra == 0 && attempt > 0 && !std::mem::replace(&mut stiff, true);
-            let sound = extra == 0 && !found;
-            if let Ok(factored) = factored
-                && sound
-                && accept(&factored, &films)
-            {
-                return Ok((unstable.unwrap_or(0), shift));
-            }
-            shift = (shift * if found { MARGIN } else { SHIFT_GROWTH }).max(FIRST_SHIFT);
+        let mut accepted = |shift: f64| {
+            self.factored(assembled, walls, shift, |factored, films, negative| {
+                (negative == 0 && factored.is_some_and(|factored| accept(factored, films)), negative)
+            })
+        };
+        let (taken, unstable) = accepted(damping);
+        if taken {
+            return Ok((unstable, damping));
         }
-        Err(FactorError::Singular { unknowns: self.layout.unknowns })
+        let first = (SHIFT_GROWTH * damping).max(FIRST_SHIFT);
+        let stage = |at: i32| first * SHIFT_GROWTH.powi(at);
+        let mut least = 0;
+        if unstable > 0 {
+            // Whatever is added makes it the more positive, so that the least stage is found from any start.
+            let is_positive =
+                |at: i32| self.factored(assembled, walls, stage(at), |_, _, negative| negative == 0);
+            least = self.last_stage.load(Ordering::Relaxed);
+            if is_positive(least) {
+                while least > 0 && is_positive(least - 1) {
+                    least -= 1;
+                }
+            } else {
+                least = (least + 1..SHIFTS).find(|&at| is_positive(at)).unwrap_or(SHIFTS);
+            }
+            self.last_stage.store(least.min(SHIFTS - 1), Ordering::Relaxed);
+        }
+        (least..SHIFTS)
+            .map(|at| MARGIN * stage(at))
+            .find(|&shift| accepted(shift).0)
+            .map(|shift| (unstable, shift))
+            .ok_or(FactorError::Singular { unknowns: self.layout.unknowns })
+    }
+
+    /// What `look` makes of the Hessian stiffened by `shift`: its factors, if there are any, the condensed films, and the
+    /// directions of negative curvature, one if it has no factors.
+    fn factored<T>(
+        &self,
+        assembled: &[FilmHessian],
+        walls: &[f64],
+        shift: f64,
+        look: impl FnOnce(Option<&Factored<'_>>, &[FilmSystem], usize) -> T,
+    ) -> T {
+        let films = self.condense(assembled, shift);
+        let softening = self.softening(&films);
+        let entries = self.entries(&films, walls, shift);
+        let factored = Factored::new(&self.layout, &self.symbolic, entries, &softening).ok();
+        let inner: usize = films.iter().map(|film| film.negative).sum();
+        let negative = |found: &Factored<'_>| (found.negative + inner).saturating_sub(self.layout.pressures);
+        let extra = factored.as_ref().map_or(1, negative);
+        look(factored.as_ref(), &films, extra)
     }
 
     /// Minus the gradient of the Lagrangian and the volumes that are missing; and how large they are.
