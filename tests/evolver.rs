@@ -333,7 +333,7 @@ fn what_vanishes_on_a_wall_adds_no_energy_to_it() {
 fn edges_on_one_sided_walls_keep_their_chords_and_are_spoken_of() {
     let Some(text) = shared("TorusOuter.fe") else { return };
     let text = text.replace("constraint 1   /*", "constraint 1 nonpositive /*");
-    let (_, told) = run(&text, "").unwrap();
+    let (_, told) = run(&text, "r").unwrap();
     assert!(told.text.contains("of the volume of body 1; refine"), "{}", told.text);
 }
 
