@@ -250,3 +250,13 @@ fn wrong_uses_of_arrays_and_procedures_are_said() {
         }
     }
 }
+
+#[test]
+fn energies_of_refinements_are_told_with_their_limit() {
+    let cube = include_str!("support/cube.fe");
+    let (_, told) = run(cube, "quiet on; g 5; r; g 5; r; g 5; e; gogo := { u }; list procedures").unwrap();
+    // As Surface Evolver prints them.
+    for words in ["refinement: 1  energy:   4.90749027", "extrapolation:   4.8361812", "procedure gogo"] {
+        assert!(told.text.contains(words), "{}", told.text);
+    }
+}

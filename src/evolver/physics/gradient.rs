@@ -89,6 +89,9 @@ impl Weights {
     }
 }
 
+/// Takes the gradient of a part by its nodes.
+type Pass<'a> = dyn FnMut(&[u32], &[DVec3], Destination) + 'a;
+
 /// Where gradients are summed.
 struct Sink {
     /// By vertex, where it is asked for.
@@ -217,13 +220,7 @@ impl Problem {
     }
 
     /// Gives the gradients of edges, part by part, to `pass`.
-    fn edge_gradients(
-        &self,
-        terms: &[Term<3>],
-        places: &[DVec3],
-        energy: bool,
-        pass: &mut dyn FnMut(&[u32], &[DVec3], Destination),
-    ) {
+    fn edge_gradients(&self, terms: &[Term<3>], places: &[DVec3], energy: bool, pass: &mut Pass<'_>) {
         let mut local = [DVec3::ZERO; 6];
         for term in terms {
             let nodes = term.places(places);

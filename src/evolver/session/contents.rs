@@ -43,6 +43,10 @@ const PARTED_CHORDS: f64 = 0.02;
 /// What may lie between walls and edges that keep their chords, as a part of the volume, before it is said.
 const KEPT: f64 = 1e-3;
 
+/// How much of that a run may go on with: the coarsest contact lines cut off a twentieth; a bubble that is drawn into volume which
+/// it does not hold passes through any part.
+const MOST_KEPT: f64 = 0.1;
+
 impl Session {
     /// Takes contents along the edges' chords for good, as Surface Evolver does.
     pub fn keep_chords(&mut self) {
@@ -136,14 +140,16 @@ impl Session {
         }
         let lines = problem.contact_lines(self.surface.bodies.len(), places);
         let closed = closed_volumes(problem, &self.surface, places);
+        let kept = problem.kept_volumes(self.surface.bodies.len(), places);
         for (id, line) in lines.enumerated() {
             let Some(closed) = closed[id] else { continue };
             let body = &self.surface.bodies[id];
             let volume = current.values.functionals[FunctionalId::from_index(id.index())];
             let size = self.size_of(id);
             let missing = if self.contents_on_walls() { 0.0 } else { line.cut };
-            let singular = (volume + missing + line.refined - closed).abs() > PARTED * size;
-            if !singular && (volume - closed).abs() <= PARTED_CHORDS * size {
+            let kept = kept[id].min(MOST_KEPT * size);
+            let singular = (volume + missing + line.refined - closed).abs() > PARTED * size + kept;
+            if !singular && (volume - closed).abs() <= PARTED_CHORDS * size + kept {
                 continue;
             }
             let reason = if singular {
