@@ -98,7 +98,7 @@ pub(crate) fn gather(
     let view = |cell: usize| {
         let near = grid.within(centres[cell], AROUND * pitches[cell]).map(|(other, _)| &all[other]);
         let shapes =
-            near.filter(|e| e.visible == 1.0 && e.closure >= LEAST_CLOSURE).filter_map(|e| unit(e.ellipse));
+            near.filter(|e| e.visible >= 1.0 && e.closure >= LEAST_CLOSURE).filter_map(|e| unit(e.ellipse));
         unit(shapes.sum::<DMat2>()).unwrap_or(DMat2::IDENTITY)
     };
     let views: Vec<DMat2> = (0..count).into_par_iter().map(view).collect();
