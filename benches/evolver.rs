@@ -1,4 +1,4 @@
-//! Time of `g` and of `hessian` on a bubble of thousands of facets, per facet; with `fuzz SECONDS`, random texts through the
+//! Time of `g` and of `hessian` on a bubble of thousands of facets, per facet; with `fuzz SECONDS SEED`, random texts through the
 //! reader and the interpreter for that long.
 //!
 //!     cargo bench --bench evolver
@@ -159,11 +159,11 @@ pp(3); delete edge[5]; o; pop vertex; refine edge where length > 0.4; t 0.2
 const LETTERS: &[u8] = b" 0123456789-+.*/()[]{};:=,\nabcdefgvx";
 
 /// Random bytes, random words, and mutations of a sound file; a session runs what can be read.
-fn fuzz(seconds: u64) {
-    let mut random = ChaCha8Rng::seed_from_u64(1);
+fn fuzz(seconds: u64, seed: u64) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
     let end = Instant::now() + Duration::from_secs(seconds);
     let mut count = 0_u64;
-    let mut slowest = Duration::ZERO;
+    let (mut slowest, mut slow_text) = (Duration::ZERO, String::new());
     while Instant::now() < end {
         let text = match count % 3 {
             0 => {
@@ -186,7 +186,7 @@ fn fuzz(seconds: u64) {
         };
         count += 1;
         let began = Instant::now();
-        let source = Source::new("fuzz", text);
+        let source = Source::new("fuzz", text.as_str());
         if let Ok(mut document) = Document::new(&source) {
             let commands = std::mem::take(&mut document.commands);
             if let Ok(mut session) = Session::new(document) {
@@ -199,15 +199,22 @@ fn fuzz(seconds: u64) {
             session.set_budget(50);
             let _ = session.run(&source, &statements, &mut Silent);
         }
-        slowest = slowest.max(began.elapsed());
+        if began.elapsed() > slowest {
+            (slowest, slow_text) = (began.elapsed(), text);
+        }
     }
-    println!("{count} texts in {seconds} s, the slowest took {:.3} s", slowest.as_secs_f64());
+    println!("{count} texts in {seconds} s, the slowest took {:.3} s:\n{slow_text}", slowest.as_secs_f64());
 }
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     match arguments.iter().position(|word| word == "fuzz") {
-        Some(at) => fuzz(arguments.get(at + 1).and_then(|seconds| seconds.parse().ok()).unwrap_or(60)),
+        Some(at) => {
+            let number = |place: usize, default: u64| {
+                arguments.get(place).and_then(|number| number.parse().ok()).unwrap_or(default)
+            };
+            fuzz(number(at + 1, 60), number(at + 2, 1));
+        }
         None => speed(),
     }
 }

@@ -291,6 +291,10 @@ fn prompt(session: &mut Session, host: &mut Terminal) -> Result<Flow, EvolverErr
         if text.trim().is_empty() {
             continue;
         }
+        if text.trim() == "history" {
+            out(&prompt.history());
+            continue;
+        }
         prompt.remember(&text.replace('\n', " "));
         let source = Source::new("command", text);
         match parse_commands(&source).and_then(|statements| session.run(&source, &statements, host)) {

@@ -16,6 +16,7 @@ pub(super) enum Typed {
 /// Reads lines from a terminal.
 pub(super) struct Prompt {
     editor: DefaultEditor,
+    commands: Vec<String>,
 }
 
 impl Prompt {
@@ -26,7 +27,7 @@ impl Prompt {
     pub(super) fn new() -> Result<Self, io::Error> {
         let config = Config::builder().auto_add_history(false).max_history_size(HISTORY).map(|b| b.build());
         let editor = config.and_then(DefaultEditor::with_config).map_err(io::Error::other)?;
-        Ok(Self { editor })
+        Ok(Self { editor, commands: Vec::new() })
     }
 
     /// The next line.
@@ -46,6 +47,15 @@ impl Prompt {
     pub(super) fn remember(&mut self, command: &str) {
         // A history that is full or says the same twice is no fault.
         let _ = self.editor.add_history_entry(command);
+        self.commands.push(command.to_owned());
+        if self.commands.len() > HISTORY {
+            self.commands.remove(0);
+        }
+    }
+
+    /// The commands so far, the oldest first, each with its number.
+    pub(super) fn history(&self) -> String {
+        self.commands.iter().enumerate().map(|(at, command)| format!("{}) {command}\n", at + 1)).collect()
     }
 }
 

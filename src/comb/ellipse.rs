@@ -25,6 +25,11 @@ impl Ellipse {
         Self { centre, area, squares: moments * 4.0 }
     }
 
+    /// The same elsewhere.
+    pub(crate) fn moved(self, by: DVec2) -> Self {
+        Self { centre: self.centre + by, ..self }
+    }
+
     /// The ellipse of the same shape whose half axes' product is 1, as the matrix of their squares; `None` of a line.
     pub(crate) fn shape(&self) -> Option<DMat2> {
         unit(self.squares)

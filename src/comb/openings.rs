@@ -12,7 +12,7 @@ use super::{
     grid::Grid,
     kinds::median,
     lattice::Site,
-    plane::Plane,
+    plane::{Plane, pixels},
 };
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -39,6 +39,9 @@ const HALF_OPENING: f64 = 0.42;
 /// a marker must still reach the far ends.
 const WIDTH: f64 = 1.4;
 const LEAST_WIDTH: f64 = 0.62;
+/// Edge of a tile in pixels, and what lies around it in pitches: no opening is wider.
+const TILE: usize = 192;
+const MARGIN: f64 = 1.5;
 
 /// Cells that the lattice missed.
 pub(crate) struct Missed {
@@ -57,7 +60,7 @@ pub(crate) fn missed(
     pitch: impl Fn(DVec2) -> f64,
 ) -> Missed {
     let typical = median(positions.iter().map(|p| pitch(*p))).max(1.0);
-    let openings = openings(relief, AREA.start * typical * typical);
+    let openings = openings(relief, typical);
     let grid = Grid::of(positions, typical);
     let is_known = |opening: &Ellipse| {
         let reach = opening.half_axes()[0];
@@ -148,12 +151,39 @@ impl Water {
     }
 }
 
-/// The openings of a relief, none smaller than `least_area` pixels.
-fn openings(relief: &Plane, least_area: f64) -> Vec<Ellipse> {
+/// The openings of a relief. It is flooded in tiles, which stay in a processor's cache, with a margin in which what reaches into a
+/// tile ends; their number follows from the relief alone.
+fn openings(relief: &Plane, pitch: f64) -> Vec<Ellipse> {
+    let margin = pixels(MARGIN * pitch);
+    let starts = |length: usize| (0..length).step_by(TILE);
+    let tiles: Vec<[usize; 2]> =
+        starts(relief.height()).flat_map(|y| starts(relief.width()).map(move |x| [x, y])).collect();
+    let of_tile = |[x, y]: [usize; 2]| {
+        let corner = [x.saturating_sub(margin), y.saturating_sub(margin)];
+        let end = |start: usize, length: usize| (start + TILE + margin).min(length);
+        let size = [end(x, relief.width()) - corner[0], end(y, relief.height()) - corner[1]];
+        let tile = Plane::from_fn(size[0], size[1], |u, v| relief.at(corner[0] + u, corner[1] + v));
+        let offset = DVec2::new(corner[0] as f64, corner[1] as f64);
+        let core = DVec2::new(x as f64, y as f64);
+        let is_inside = move |opening: &Ellipse| {
+            let place = opening.centre - core;
+            place.cmpge(DVec2::ZERO).all() && place.cmplt(DVec2::splat(TILE as f64)).all()
+        };
+        flooded(&tile, AREA.start * pitch * pitch)
+            .into_iter()
+            .map(|opening| opening.moved(offset))
+            .filter(is_inside)
+            .collect::<Vec<Ellipse>>()
+    };
+    tiles.into_par_iter().flat_map_iter(of_tile).collect()
+}
+
+/// The openings of a tile, none smaller than `least_area` pixels.
+fn flooded(relief: &Plane, least_area: f64) -> Vec<Ellipse> {
     let (width, count) = (relief.width(), relief.width() * relief.height());
     let level = |pixel: u32| relief.data()[pixel as usize];
     let mut order: Vec<u32> = (0..crate::index::checked_u32(count)).collect();
-    order.par_sort_unstable_by(|a, b| level(*a).total_cmp(&level(*b)).then(a.cmp(b)));
+    order.sort_unstable_by(|a, b| level(*a).total_cmp(&level(*b)).then(a.cmp(b)));
     let mut flood =
         Flood { water_of: vec![Flood::DRY; count], waters: Vec::new(), least_area, found: Vec::new() };
     for number in order {
@@ -246,7 +276,7 @@ mod tests {
             let wave = |v: usize, period: f64| (std::f64::consts::TAU * (v as f64 + 0.5) / period).cos();
             narrow(wave(x, across) + wave(y, along))
         });
-        let found = openings(&relief, 12.0);
+        let found = openings(&relief, 30.0);
         // The water rises to the saddles, at 0, where it covers half of the plane.
         assert_eq!(found.len(), 10 * 10);
         // The corners of a pit, a diamond, are thinner than a pixel.
@@ -264,7 +294,7 @@ mod tests {
                 let wave = |v: usize, period: f64| (std::f64::consts::TAU * (v as f64 + 0.5) / period).cos();
                 narrow(wave(x, 20.0) + wave(y, along))
             });
-            let places: Vec<DVec2> = openings(&relief, 12.0).iter().map(|opening| opening.centre).collect();
+            let places: Vec<DVec2> = openings(&relief, 20.0).iter().map(|opening| opening.centre).collect();
             let missing = DVec2::new(110.0, 5.5 * along);
             let positions: Vec<DVec2> = places.into_iter().filter(|p| p.distance(missing) > 3.0).collect();
             let sites: Vec<Site> = positions.iter().map(|place| Site::new(*place, 0)).collect();

@@ -77,7 +77,7 @@ const DISPLAY: [&str; 12] = [
 ];
 
 /// Commands of Surface Evolver that are not supported, with the nearest way to do it.
-const REFUSED: [(&str, &str); 35] = [
+const REFUSED: [(&str, &str); 33] = [
     ("lagrange", "quadratic elements are supported: quadratic"),
     ("addload", "put all elements into one datafile"),
     ("load", "run another datafile: combwright evolver run FILE"),
@@ -94,8 +94,6 @@ const REFUSED: [(&str, &str); 35] = [
     ("dissolve", "use delete"),
     ("divide", ""),
     ("notch", ""),
-    ("n", "refine edges where the dihedral angle is large: refine edge where dihedral > a"),
-    ("j", "set the coordinates of vertices with a formula"),
     ("jiggle", "set the coordinates of vertices with a formula"),
     ("longj", "set the coordinates of vertices with a formula"),
     ("homothety", ""),
@@ -115,6 +113,28 @@ const REFUSED: [(&str, &str); 35] = [
     ("breakpoint", ""),
 ];
 
+/// The same, for commands of one letter.
+const REFUSED_LETTERS: [(&str, &str); 18] = [
+    ("a", ""),
+    ("b", "set a body's number: body[1].target := value, body[1].pressure := value"),
+    ("f", ""),
+    ("F", "redirect the output of commands with >>"),
+    ("j", "set the coordinates of vertices with a formula"),
+    ("J", "set the coordinates of vertices with a formula"),
+    ("k", "set gap_constant in the datafile"),
+    ("n", "refine edges where the dihedral angle is large: refine edge where dihedral > a"),
+    ("N", "set a body's number: body[1].target := body[1].volume"),
+    ("p", "set a body's number: body[1].pressure := value"),
+    ("P", "pictures of foams: combwright foam"),
+    ("W", ""),
+    ("X", "list the elements"),
+    ("y", ""),
+    ("z", ""),
+    ("Z", ""),
+    ("E", "dump writes the surface"),
+    ("L", "redirect the output of commands with >>"),
+];
+
 /// Single letters mean different things in lower and upper case.
 fn letter(cursor: &mut Cursor, letter: &str) -> Option<Parsed> {
     let simple = |simple| Some(Ok(Action::Simple(simple)));
@@ -131,16 +151,24 @@ fn letter(cursor: &mut Cursor, letter: &str) -> Option<Parsed> {
         "u" => return simple(Simple::Equiangulate),
         "V" => return simple(Simple::Average),
         "v" => return simple(Simple::Volumes),
-        "e" | "c" => return simple(Simple::Counts),
+        "c" => return simple(Simple::Counts),
+        "e" => return simple(Simple::Extrapolate),
+        "A" => return simple(Simple::Variables),
+        "Q" => return simple(Simple::NamedQuantities),
         "o" => return simple(Simple::PopNonminimal),
         "O" => return simple(Simple::PopEdges),
         "U" => return simple(Simple::ConjugateGradient(None)),
         "C" => return simple(Simple::Check),
-        "X" | "z" | "i" | "E" | "B" | "L" => return simple(Simple::Information),
+        "i" => return simple(Simple::Information),
         "q" | "x" => return simple(Simple::Quit),
-        "s" | "p" | "d" | "D" | "S" => return simple(Simple::Nothing),
+        "d" => return Some(optional_text(cursor).map(Action::Dump)),
+        "s" | "D" | "S" => return simple(Simple::Nothing),
         "h" => return simple(Simple::Help),
-        _ => return None,
+        _ => {
+            let (_, hint) = REFUSED_LETTERS.iter().find(|(name, _)| *name == letter)?;
+            skip_statement(cursor);
+            return Some(Ok(Action::Refused(letter.into(), hint)));
+        }
     };
     let number = match cursor.kind() {
         TokenKind::Symbol(";" | "}" | ")" | ">>") | TokenKind::End => Ok(None),
@@ -233,7 +261,7 @@ fn plain_command(cursor: &mut Cursor, word: &str) -> Option<Parsed> {
         "recalc" => return simple(Simple::Recalculate),
         "convert_to_quantities" => return simple(Simple::Quantities),
         "quit" | "exit" | "bye" => return simple(Simple::Quit),
-        "help" => return simple(Simple::Help),
+        "help" => optional_text(cursor).map(|_| Action::Simple(Simple::Help)),
         "counts" => return simple(Simple::Counts),
         "equiangulate_all" => return simple(Simple::Equiangulate),
         "u" => return simple(Simple::Equiangulate),

@@ -114,8 +114,14 @@ pub enum Simple {
     Recalculate,
     /// `convert_to_quantities`
     Quantities,
-    /// `X`, `z`, `i`: information.
+    /// `i`: information.
     Information,
+    /// `e`: the energies of successive refinements and what they tend to.
+    Extrapolate,
+    /// `A`: variables and their values.
+    Variables,
+    /// `Q`: quantities and their values.
+    NamedQuantities,
     /// `q`, `quit`
     Quit,
     /// `break`
@@ -233,7 +239,7 @@ pub enum Action {
     Toggle(Arc<str>, Option<bool>),
     /// `define vertex attribute …`.
     DefineAttribute(ExtraAttribute),
-    /// `list` of something other than elements: nothing here.
+    /// `list` of something other than elements.
     ListInformation(Arc<str>),
     /// A command that is not supported: its name and the nearest way to do it. It is an error where it runs.
     Refused(Arc<str>, &'static str),

@@ -116,6 +116,9 @@ fn simple_statement(cursor: &mut Cursor) -> Parsed {
     if cursor.accept("!") {
         return cursor.unsupported(cursor.position(), "the history command «!»", "use the arrow keys");
     }
+    if cursor.accept("?") {
+        return Ok(Action::Simple(Simple::Help));
+    }
     let Some(word) = cursor.word() else {
         return cursor.expected("a command");
     };

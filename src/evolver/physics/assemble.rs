@@ -46,6 +46,25 @@ pub(super) struct Share {
 }
 
 impl Share {
+    /// With room for what elements of these nodes add.
+    pub(super) fn with_room<'a>(
+        elements: impl Iterator<Item = &'a [u32]>,
+        directions: &IndexVec<VertexId, Own>,
+    ) -> Self {
+        let (mut entries, mut forces) = (0, 0);
+        for nodes in elements {
+            let own = |&node: &u32| directions[VertexId::from_index(node as usize)].along.as_slice().len();
+            let all: usize = nodes.iter().map(own).sum();
+            entries += all * (all + 1) / 2;
+            forces += nodes.len();
+        }
+        Self {
+            entries: Vec::with_capacity(entries),
+            values: Vec::with_capacity(entries),
+            forces: Vec::with_capacity(forces),
+        }
+    }
+
     fn push(&mut self, row: u32, column: u32, value: f64) {
         self.entries.push((row.max(column), row.min(column)));
         self.values.push(value);
@@ -93,7 +112,7 @@ pub(crate) struct Start<'a> {
 impl Assembled {
     pub(super) fn new(start: &Start<'_>) -> Self {
         let &Start { problem, surface, neighbours, state, multipliers, normal, still } = start;
-        let along = if normal { Some(normals(surface, neighbours)) } else { None };
+        let along = normal.then(|| normals(problem, &state.places, surface, neighbours));
         let plane = surface.dimension == 2;
         let used = used_vertices(surface);
         let directions_of = |at: usize| {

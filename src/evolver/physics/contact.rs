@@ -144,4 +144,20 @@ impl Problem {
         };
         self.contacts.iter().map(ends).collect()
     }
+
+    /// What lies between the walls and the edges whose slivers never count, for each body by absolute shares: along the normals
+    /// of the content's wall. Edges that do not lie on that wall have none.
+    pub(crate) fn kept_volumes(&self, bodies: usize, places: &Places) -> IndexVec<BodyId, f64> {
+        let mut kept = IndexVec::from_elem(0.0, bodies);
+        for contact in &self.kept_chords {
+            let nodes = contact.edge.places(places.as_slice());
+            let nodes = &nodes[..usize::from(contact.edge.count)];
+            let EdgePart::Sliver(sliver) = &self.edge_fields[contact.sliver as usize] else { continue };
+            if sliver.is_on_wall(nodes) {
+                let volume = sliver.value(nodes)[0].abs();
+                kept[contact.body] += if volume.is_finite() { volume } else { 0.0 };
+            }
+        }
+        kept
+    }
 }

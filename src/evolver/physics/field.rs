@@ -35,6 +35,11 @@ fn by_rows(rows: [DVec3; 3]) -> DMat3 {
 }
 
 impl VectorField {
+    /// The field that vanishes.
+    pub(super) fn zero() -> Self {
+        Self::Formula(Box::new([0.0; 3].map(Bound::constant)))
+    }
+
     pub(super) fn value(&self, x: DVec3) -> DVec3 {
         match self {
             Self::Height => DVec3::new(0.0, 0.0, x.z),

@@ -5,7 +5,7 @@ use super::{
     assemble::{Own, Share},
     edge::{self, EdgeField},
     facet::FacetField,
-    problem::{Destination, EdgePart, FunctionalId, Part, Problem, Term, shifted},
+    problem::{Destination, EDGE_CHUNK, EdgePart, FunctionalId, Part, Problem, Term, shifted},
 };
 use crate::{
     evolver::surface::VertexId,
@@ -189,20 +189,23 @@ impl Problem {
                 .collect();
             sink.add_all(&parts);
         }
-        let mut local = [DVec3::ZERO; 6];
-        for term in &self.edges {
-            let nodes = term.places(places);
-            let nodes = &nodes[..usize::from(term.count)];
-            let rule = self.rule(nodes.len());
-            if energy && term.tension.abs() > 0.0 {
-                local.fill(DVec3::ZERO);
-                EdgeField::Length.add(term.tension, rule, nodes, &mut local, None);
-                self.pass(term.nodes(), &local, Destination::Energy, &mut sink);
-            }
-            for part in self.edge_parts[term.parts()].iter().filter(|part| self.counts(part, energy)) {
-                local.fill(DVec3::ZERO);
-                self.edge_part(part, nodes, part.weight, &mut local, None);
-                self.pass(term.nodes(), &local, part.destination, &mut sink);
+        if self.edges.len() <= EDGE_CHUNK {
+            self.edge_gradients(&self.edges, places, energy, &mut |nodes, local, destination| {
+                self.pass(nodes, local, destination, &mut sink);
+            });
+        } else {
+            let shares = self.edges.par_chunks(EDGE_CHUNK).map(|terms| {
+                let mut shares = Vec::new();
+                self.edge_gradients(terms, places, energy, &mut |nodes, local, destination| {
+                    let (mut at, mut own) = ([0; 3], [DVec3::ZERO; 3]);
+                    at[..nodes.len()].copy_from_slice(nodes);
+                    own.copy_from_slice(&local[..3]);
+                    shares.push((at, nodes.len(), own, destination));
+                });
+                shares
+            });
+            for (nodes, count, local, destination) in shares.collect::<Vec<_>>().into_iter().flatten() {
+                self.pass(&nodes[..count], &local, destination, &mut sink);
             }
         }
         for point in &self.points {
@@ -211,6 +214,31 @@ impl Problem {
             self.pass(&node, &[slope], point.destination, &mut sink);
         }
         sink
+    }
+
+    /// Gives the gradients of edges, part by part, to `pass`.
+    fn edge_gradients(
+        &self,
+        terms: &[Term<3>],
+        places: &[DVec3],
+        energy: bool,
+        pass: &mut dyn FnMut(&[u32], &[DVec3], Destination),
+    ) {
+        let mut local = [DVec3::ZERO; 6];
+        for term in terms {
+            let nodes = term.places(places);
+            let nodes = &nodes[..usize::from(term.count)];
+            if energy && term.tension.abs() > 0.0 {
+                local.fill(DVec3::ZERO);
+                EdgeField::Length.add(term.tension, self.rule(nodes.len()), nodes, &mut local, None);
+                pass(term.nodes(), &local, Destination::Energy);
+            }
+            for part in self.edge_parts[term.parts()].iter().filter(|part| self.counts(part, energy)) {
+                local.fill(DVec3::ZERO);
+                self.edge_part(part, nodes, part.weight, &mut local, None);
+                pass(term.nodes(), &local, part.destination);
+            }
+        }
     }
 
     /// Whether a part enters the gradients that are asked for.
@@ -303,6 +331,7 @@ impl Problem {
                 }
             }
             EdgePart::Sliver(sliver) => sliver.add(factor, nodes, gradient, hessian),
+            EdgePart::Rim(rim) => rim.add(factor, nodes, gradient, hessian),
         }
     }
 
@@ -315,7 +344,8 @@ impl Problem {
     ) -> Vec<Share> {
         let places = places.as_slice();
         let facets = self.facets.par_chunks(CHUNK).map(|terms| {
-            let (mut local, mut share) = (Local::default(), Share::default());
+            let mut local = Local::default();
+            let mut share = Share::with_room(terms.iter().map(Term::nodes), directions);
             for term in terms {
                 if self.facet_local(term, places, weights, &mut local) {
                     share.add(&local, directions);
@@ -323,8 +353,9 @@ impl Problem {
             }
             share
         });
-        let edges = self.edges.par_chunks(CHUNK).map(|terms| {
-            let (mut local, mut share) = (Local::default(), Share::default());
+        let edges = self.edges.par_chunks(EDGE_CHUNK).map(|terms| {
+            let mut local = Local::default();
+            let mut share = Share::with_room(terms.iter().map(Term::nodes), directions);
             for term in terms {
                 self.edge_local(term, places, weights, &mut local);
                 share.add(&local, directions);

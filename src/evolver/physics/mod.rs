@@ -13,7 +13,7 @@
 //! | directions in which vertices may move; return to constraints; normals of films | `freedom.rs`, `normals.rs` |
 //! | gradient steps with volumes held | `descend.rs` |
 //! | the matrix of a Newton step; the step and its inertia; eigenvalues, by the foam's sparse solver | `assemble.rs`, `newton.rs`, `eigen.rs` |
-//! | what lies between edges and their walls, and how much it weighs | `sliver.rs`, `contact.rs` |
+//! | what lies between edges and their walls, volume and film, and how much it weighs | `sliver.rs`, `rim.rs`, `contact.rs` |
 //! | carrying the surface along its walls | `carry.rs` |
 //! | volumes closed on the walls themselves, by the foam's kernels | `closed.rs` |
 
@@ -31,6 +31,7 @@ mod gradient;
 pub(crate) mod newton;
 mod normals;
 mod problem;
+mod rim;
 mod sliver;
 pub(crate) mod terms;
 mod wall_terms;

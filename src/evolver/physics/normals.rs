@@ -1,6 +1,6 @@
 //! The normals along which Newton steps move vertices: across films, and across lines where films meet.
 
-use super::freedom::Directions;
+use super::{Places, freedom::Directions, problem::Problem};
 use crate::{
     evolver::{
         datafile::Representation,
@@ -13,25 +13,39 @@ use rayon::prelude::*;
 
 /// The normals at each vertex: one within a film, two where three films meet along a line, `None` (all directions) where
 /// lines meet.
-pub(super) fn normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Directions>> {
+pub(super) fn normals(
+    problem: &Problem,
+    places: &Places,
+    surface: &Surface,
+    neighbours: &Neighbours,
+) -> IndexVec<VertexId, Option<Directions>> {
     match surface.representation {
-        Representation::Soapfilm => film_normals(surface, neighbours),
+        Representation::Soapfilm => film_normals(problem, places, surface, neighbours),
         Representation::String => string_normals(surface, neighbours),
     }
 }
 
-fn film_normals(surface: &Surface, neighbours: &Neighbours) -> IndexVec<VertexId, Option<Directions>> {
-    let areas: Vec<DVec3> = (0..surface.facets.len())
-        .into_par_iter()
-        .map(|at| surface.area_vector(FacetId::from_index(at)))
+fn film_normals(
+    problem: &Problem,
+    places: &Places,
+    surface: &Surface,
+    neighbours: &Neighbours,
+) -> IndexVec<VertexId, Option<Directions>> {
+    let areas: Vec<DVec3> = problem
+        .facets
+        .par_iter()
+        .map(|term| {
+            let [a, b, c, ..] = term.places(places.as_slice());
+            0.5 * (b - a).cross(c - b)
+        })
         .collect();
     let areas: IndexVec<FacetId, DVec3> = areas.into();
     // Neighbouring facets may be turned round: each is counted to the side of those before.
     let mut sums = IndexVec::from_elem(DVec3::ZERO, surface.vertices.len());
-    for (id, facet) in surface.facets.enumerated() {
-        for &directed in &facet.edges {
-            let sum = &mut sums[surface.tail(directed)];
-            *sum = one_sided(*sum, areas[id]);
+    for (term, &area) in problem.facets.iter().zip(areas.iter()) {
+        for &corner in &term.nodes[..3] {
+            let sum = &mut sums[VertexId::from_index(corner as usize)];
+            *sum = one_sided(*sum, area);
         }
     }
     let mut middles: IndexVec<VertexId, Option<EdgeId>> = IndexVec::from_elem(None, surface.vertices.len());

@@ -6,6 +6,7 @@ use super::{
     facet::FacetField,
     freedom::Hold,
     gradient::Slots,
+    rim::Rim,
     sliver::Sliver,
 };
 use crate::{
@@ -141,6 +142,8 @@ pub struct Problem {
     pub(super) rules: [Vec<CurvePoint>; 2],
     /// The edges along which contents are integrated, body by body.
     pub(super) contacts: Vec<Contact>,
+    /// Those whose slivers never count.
+    pub(super) kept_chords: Vec<Contact>,
     pub(super) strings: bool,
     /// Whether volumes are restored to a part of their shares, as quantities are, instead of absolutely.
     pub(crate) relative: bool,
@@ -148,12 +151,13 @@ pub struct Problem {
     pub(super) pattern: OnceLock<Slots>,
 }
 
-/// A field along edges, the gap at a convex wall, or the volume between an edge and its wall.
+/// A field along edges, the gap at a convex wall, the volume between an edge and its wall, or the film there.
 #[derive(Clone, Debug)]
 pub(super) enum EdgePart {
     Field(EdgeField),
     Gap(Bound),
     Sliver(Box<Sliver>),
+    Rim(Rim),
 }
 
 /// Energy and functionals of one set of places.
@@ -171,6 +175,9 @@ pub struct Values {
 
 /// Facets that one thread sums at a time: fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 2048;
+
+/// The same for edges, whose formulas take longer.
+pub(super) const EDGE_CHUNK: usize = 64;
 
 /// What a chunk adds up.
 struct Sums {
@@ -235,10 +242,10 @@ impl Problem {
         } else {
             self.facets.par_chunks(CHUNK).map(|chunk| self.facet_sums(chunk, places)).collect()
         };
-        let edges: Vec<Sums> = if self.edges.len() <= CHUNK {
+        let edges: Vec<Sums> = if self.edges.len() <= EDGE_CHUNK {
             vec![self.edge_sums(&self.edges, places)]
         } else {
-            self.edges.par_chunks(CHUNK).map(|chunk| self.edge_sums(chunk, places)).collect()
+            self.edges.par_chunks(EDGE_CHUNK).map(|chunk| self.edge_sums(chunk, places)).collect()
         };
         let mut points = Sums::new();
         for point in &self.points {
@@ -311,6 +318,11 @@ impl Problem {
                     EdgePart::Field(field) => field.value(rule, &moved[..nodes.len()]),
                     EdgePart::Gap(wall) => edge::gap(wall, &[nodes[0], nodes[nodes.len() - 1]]),
                     EdgePart::Sliver(sliver) => sliver.value(nodes)[0],
+                    EdgePart::Rim(rim) => {
+                        let area = rim.value(nodes);
+                        sums.area += area;
+                        area
+                    }
                 };
                 sums.add(part.destination, part.weight * value);
             }

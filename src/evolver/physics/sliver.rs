@@ -35,36 +35,62 @@ const SETTLED: f64 = 1e-9;
 static CURVES: LazyLock<[Vec<CurvePoint>; 2]> = LazyLock::new(|| [rule(2, ALONG), rule(3, ALONG)]);
 static RULE: LazyLock<Vec<CurvePoint>> = LazyLock::new(|| rule(2, ACROSS));
 
+/// The way from an edge to the wall that its ends lie on.
+#[derive(Clone, Debug)]
+pub(super) struct Reach {
+    wall: Bound,
+}
+
 /// The fields whose flux through the sliver between an edge and its wall counts.
 #[derive(Clone, Debug)]
 pub(super) struct Sliver {
-    pub(super) wall: Bound,
+    reach: Reach,
     /// The integrand `ω` of the content.
-    pub(super) content: VectorField,
+    content: VectorField,
     /// The films' field `F`.
-    pub(super) film: VectorField,
+    film: VectorField,
 }
 
 /// The wall over one point of an edge.
-struct Foot<'a> {
-    curve: &'a CurvePoint,
-    x: DVec3,
-    along: DVec3,
-    d: DVec3,
-    turn: DVec3,
-    z: f64,
+pub(super) struct Foot<'a> {
+    pub(super) curve: &'a CurvePoint,
+    pub(super) x: DVec3,
+    pub(super) along: DVec3,
+    pub(super) d: DVec3,
+    pub(super) turn: DVec3,
+    pub(super) z: f64,
     /// The wall's gradient at the foot.
     slope: DVec3,
 }
 
+/// Derivatives of what is summed over a sliver by the data of a [`Foot`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct FootSlopes {
+    pub(super) x: DVec3,
+    pub(super) along: DVec3,
+    pub(super) d: DVec3,
+    pub(super) turn: DVec3,
+    pub(super) z: f64,
+}
+
 impl Foot<'_> {
     /// The place at `s` of the way to the wall, and the sliver's tangent there.
-    fn at(&self, s: f64) -> (DVec3, DVec3) {
+    pub(super) fn at(&self, s: f64) -> (DVec3, DVec3) {
         (self.x + s * self.z * self.d, self.along + s * self.z * self.turn)
     }
 }
 
-impl Sliver {
+/// Gauss points across a sliver: how far on the way to the wall, and their weights.
+pub(super) fn across() -> impl Iterator<Item = (f64, f64)> {
+    RULE.iter().map(|point| (point.value[1], point.weight))
+}
+
+impl Reach {
+    /// To this wall.
+    pub(super) fn new(wall: Bound) -> Self {
+        Self { wall }
+    }
+
     /// The unit normal of the wall and its derivative.
     fn normal(&self, p: DVec3) -> (DVec3, DMat3) {
         let jet = self.wall.jet(p);
@@ -97,27 +123,83 @@ impl Sliver {
         })
     }
 
+    /// The sum of `share` over the feet of an edge, each with its weight.
+    pub(super) fn sum<const N: usize>(
+        &self,
+        nodes: &[DVec3],
+        share: impl Fn(&Foot<'_>) -> [f64; N],
+    ) -> [f64; N] {
+        let mut normals = [DVec3::ZERO; 3];
+        normals.iter_mut().zip(nodes).for_each(|(n, &p)| *n = self.normal(p).0);
+        let mut sums = [0.0; N];
+        for foot in self.feet(nodes, &normals[..nodes.len()]) {
+            for (sum, share) in sums.iter_mut().zip(share(&foot)) {
+                *sum += foot.curve.weight * share;
+            }
+        }
+        sums
+    }
+
+    /// Adds `factor` times the gradient of such a sum by the nodes, from the slopes of its shares.
+    pub(super) fn add_gradient(
+        &self,
+        factor: f64,
+        nodes: &[DVec3],
+        gradient: &mut [DVec3],
+        slopes: impl Fn(&Foot<'_>) -> FootSlopes,
+    ) {
+        let (mut normals, mut turns) = ([DVec3::ZERO; 3], [DMat3::ZERO; 3]);
+        for (at, &node) in nodes.iter().enumerate() {
+            (normals[at], turns[at]) = self.normal(node);
+        }
+        for foot in self.feet(nodes, &normals[..nodes.len()]) {
+            let by = slopes(&foot);
+            // The height follows the edge: ∇f·(dx + z dd + d dz) = 0.
+            let follows = by.z / foot.slope.dot(foot.d) * foot.slope;
+            let (by_x, by_d) = (by.x - follows, by.d - foot.z * follows);
+            for (at, out) in gradient.iter_mut().enumerate().take(nodes.len()) {
+                let (n, t) = (foot.curve.value[at], foot.curve.dt[at]);
+                let own = n * by_x + t * by.along + turns[at].transpose() * (n * by_d + t * by.turn);
+                *out += factor * foot.curve.weight * own;
+            }
+        }
+    }
+}
+
+impl Sliver {
+    /// Of the films' field `film` and the integrand `content`.
+    pub(super) fn new(reach: Reach, content: VectorField, film: VectorField) -> Self {
+        Self { reach, content, film }
+    }
+
     /// `F + ∇×ω`.
     fn field(&self, q: DVec3) -> DVec3 {
         let rows = self.content.jet(q).jacobian.transpose();
         self.film.value(q) + curl([rows.x_axis, rows.y_axis, rows.z_axis])
     }
 
+    /// Whether the ends of an edge lie on the wall, to a thousandth of its length.
+    pub(super) fn is_on_wall(&self, nodes: &[DVec3]) -> bool {
+        let ends = [nodes[0], nodes[nodes.len() - 1]];
+        let near = 1e-3 * ends[0].distance(ends[1]);
+        ends.iter().all(|&end| {
+            let jet = self.reach.wall.jet(end);
+            jet.value.abs() <= near * jet.gradient.length()
+        })
+    }
+
     /// The volume that the chord leaves out, for a film that runs along the edge; and the area of the sliver.
     pub(super) fn value(&self, nodes: &[DVec3]) -> [f64; 2] {
-        let mut normals = [DVec3::ZERO; 3];
-        normals.iter_mut().zip(nodes).for_each(|(n, &p)| *n = self.normal(p).0);
-        let mut sums = [0.0; 2];
-        for foot in self.feet(nodes, &normals[..nodes.len()]) {
-            for across in RULE.iter() {
-                let (q, tangent) = foot.at(across.value[1]);
+        self.reach.sum(nodes, |foot| {
+            let mut sums = [0.0; 2];
+            for (s, weight) in across() {
+                let (q, tangent) = foot.at(s);
                 let area = (foot.z * foot.d).cross(tangent);
-                let weight = foot.curve.weight * across.weight;
                 sums[0] += weight * self.field(q).dot(area);
                 sums[1] += weight * area.length();
             }
-        }
-        sums
+            sums
+        })
     }
 
     /// Adds `factor` times the gradient of the volume, and the Hessian where it is asked for.
@@ -136,33 +218,20 @@ impl Sliver {
     }
 
     fn add_gradient(&self, factor: f64, nodes: &[DVec3], gradient: &mut [DVec3]) {
-        let (mut normals, mut turns) = ([DVec3::ZERO; 3], [DMat3::ZERO; 3]);
-        for (at, &node) in nodes.iter().enumerate() {
-            (normals[at], turns[at]) = self.normal(node);
-        }
-        for foot in self.feet(nodes, &normals[..nodes.len()]) {
-            let Foot { curve, d, turn, z, slope, .. } = foot;
-            let (mut by_x, mut by_along, mut by_d, mut by_turn, mut by_z) =
-                (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, 0.0);
-            for across in RULE.iter() {
-                let (s, weight) = (across.value[1], factor * curve.weight * across.weight);
+        self.reach.add_gradient(factor, nodes, gradient, |foot| {
+            let &Foot { d, turn, z, .. } = foot;
+            let mut by = FootSlopes::default();
+            for (s, weight) in across() {
                 let (q, m) = foot.at(s);
                 let (w, u) = self.pulled(q, (z * d).cross(m));
-                by_x += weight * u;
-                by_z += weight * (s * u.dot(d) + w.dot(d.cross(m)) + s * z * w.dot(d.cross(turn)));
-                by_d += weight * z * (s * u + m.cross(w));
-                by_along += weight * z * w.cross(d);
-                by_turn += weight * s * z * z * w.cross(d);
+                by.x += weight * u;
+                by.z += weight * (s * u.dot(d) + w.dot(d.cross(m)) + s * z * w.dot(d.cross(turn)));
+                by.d += weight * z * (s * u + m.cross(w));
+                by.along += weight * z * w.cross(d);
+                by.turn += weight * s * z * z * w.cross(d);
             }
-            // The height follows the edge: ∇f·(dx + z dd + d dz) = 0.
-            let follows = by_z / slope.dot(d) * slope;
-            by_x -= follows;
-            by_d -= z * follows;
-            for (at, out) in gradient.iter_mut().enumerate().take(nodes.len()) {
-                let (n, t) = (curve.value[at], curve.dt[at]);
-                *out += n * by_x + t * by_along + turns[at].transpose() * (n * by_d + t * by_turn);
-            }
-        }
+            by
+        });
     }
 
     /// The field at `q`, and the gradient there of its product with a constant `area`.
@@ -201,11 +270,8 @@ mod tests {
             formula.as_ref().map_or(Bound::constant(0.0), |formula| formula.bind(&data.variables))
         };
         let content = constraint.content.as_ref().unwrap().each_ref().map(bind);
-        Sliver {
-            wall: constraint.formula.bind(&data.variables),
-            content: VectorField::Formula(Box::new(content)),
-            film: VectorField::Height,
-        }
+        let reach = Reach::new(constraint.formula.bind(&data.variables));
+        Sliver::new(reach, VectorField::Formula(Box::new(content)), VectorField::Height)
     }
 
     const SPHERE: &str = "formula: x^2 + y^2 + z^2 = 4\ncontent:\nc1: (4 + 2*z + z^2)*y/(2+z)/3\nc2: -(4 + 2*z + z^2)*x/(2+z)/3\nc3: 0";

@@ -90,6 +90,7 @@ impl Problem {
             holds: surface.vertices.iter().map(|vertex| hold(&vertex.common)).collect(),
             rules: rules(data, conditions.on_walls),
             contacts: Vec::new(),
+            kept_chords: Vec::new(),
             strings: surface.representation == Representation::String,
             relative: conditions.relative,
             pattern: OnceLock::new(),

@@ -40,6 +40,9 @@ const PARTED: f64 = 2e-3;
 /// The same for integrals along chords: the coarsest contact lines in use cut off less than a percent.
 const PARTED_CHORDS: f64 = 0.02;
 
+/// What may lie between walls and edges that keep their chords, as a part of the volume, before it is said.
+const KEPT: f64 = 1e-3;
+
 impl Session {
     /// Takes contents along the edges' chords for good, as Surface Evolver does.
     pub fn keep_chords(&mut self) {
@@ -64,9 +67,9 @@ impl Session {
         if !problem.has_contents() {
             return Ok(());
         }
+        let quadratic = self.surface.model == Model::Quadratic;
         let lines = problem.contact_lines(self.surface.bodies.len(), places);
         let gain = problem.temptation(places, &lines, &|body| self.size_of(body));
-        let quadratic = self.surface.model == Model::Quadratic;
         let lost = lines.enumerated().find_map(|(id, line)| {
             let part = (line.cut / self.size_of(id)).abs();
             (part > line.mesh_error(quadratic)).then_some(part)
@@ -85,8 +88,31 @@ impl Session {
         current.state.store(&mut self.surface);
         self.contents = Contents::OnWalls;
         self.problem = None;
-        let _ = writeln!(self.told, "note: {reason}; from here on contents are taken on the walls");
+        let _ = writeln!(
+            self.told,
+            "note: {reason}; from here on contents are taken on the walls, and films end there"
+        );
         self.current().map(|_| ())
+    }
+
+    /// Says once where edges whose contents stay on their chords cut off more than such a mesh should.
+    fn tell_kept_chords(&mut self) {
+        let Some(current) = self.problem.as_ref().filter(|_| !self.told_kept_chords) else { return };
+        let kept = current.problem.kept_volumes(self.surface.bodies.len(), &current.state.places);
+        let worst = kept.enumerated().map(|(id, volume)| (volume / self.size_of(id), id));
+        let Some((part, id)) = worst.filter(|(part, _)| part.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0))
+        else {
+            return;
+        };
+        if part > KEPT {
+            let (part, body) = (significant(part, 2), self.surface.bodies[id].id);
+            let _ = writeln!(
+                self.told,
+                "note: edges on several or one-sided constraints, or at images of a torus, take their contents along chords, \
+                 which leave out up to {part} of the volume of body {body}; refine"
+            );
+            self.told_kept_chords = true;
+        }
     }
 
     /// The volume that a body shall have, or has.
@@ -102,6 +128,7 @@ impl Session {
     /// [`EvolverError::Surface`] with both volumes of a body where they part, and the place.
     pub(super) fn compare_volumes(&mut self) -> Done {
         self.current()?;
+        self.tell_kept_chords();
         let Some(current) = &self.problem else { return Ok(()) };
         let (problem, places) = (&current.problem, &current.state.places);
         if !problem.has_contents() {
@@ -166,7 +193,7 @@ impl Session {
 /// How far the nodes of a contact line may move, as a part of its edges, before its slivers are looked at again, and as a part
 /// of its size before volumes are compared again: both take longer than a Newton step.
 const NEARBY_EDGES: f64 = 0.05;
-const NEARBY_LINE: f64 = 0.01;
+const NEARBY_LINE: f64 = 0.05;
 
 /// Whether a contact line, by the ends of its edges, has moved by more than `limit`, or is another one.
 fn has_moved(before: &[[DVec3; 2]], now: &[[DVec3; 2]], limit: impl Fn(usize) -> f64) -> bool {

@@ -308,6 +308,7 @@ impl Session {
                     None => format!("{}.dmp", self.data.source.name),
                 };
                 let text = self.datafile()?;
+                self.say(host, &format!("Dumping to {name}.\n"));
                 host.write(&name, &text, false).map_err(|error| EvolverError::File { name, error })
             }
             Action::DefineAttribute(attribute) => {
@@ -317,7 +318,10 @@ impl Session {
                 Ok(())
             }
             Action::Histogram(query, value, _) => self.histogram(query, value, scope, host),
-            Action::ListInformation(_) => Ok(()),
+            Action::ListInformation(what) => {
+                self.list_information(what, host);
+                Ok(())
+            }
             Action::Refused(what, hint) => scope.unsupported(position, what, hint),
             Action::Set(query, name, index, value) => {
                 self.set(query, name, (index.as_ref(), value.as_ref()), position, scope)

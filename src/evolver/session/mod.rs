@@ -13,6 +13,7 @@
 //! | short edges, small and narrow facets | `mend.rs` |
 //! | T1s and pops | `pop.rs` |
 //! | changing and listing elements | `elements.rs` |
+//! | energies by refinement, variables, procedures | `information.rs` |
 //! | text with formats | `format.rs` |
 //! | datafiles | `dump.rs` |
 
@@ -25,6 +26,7 @@ mod elements;
 mod evaluate;
 mod execute;
 mod format;
+mod information;
 mod mend;
 mod motion;
 mod pop;
@@ -95,8 +97,12 @@ pub struct Session {
     /// The ends of the edges of contact lines when their slivers were last looked at, and when volumes were last compared.
     looked_at: Vec<[DVec3; 2]>,
     compared: Vec<[DVec3; 2]>,
+    /// Whether edges that keep their chords were spoken of.
+    told_kept_chords: bool,
     quiet: bool,
     eigenvalue: f64,
+    /// The energies before each refinement.
+    levels: Vec<f64>,
     /// How many commands may still run.
     budget: u64,
     spent: u64,
@@ -177,8 +183,10 @@ impl Session {
             contents: Contents::Chords,
             looked_at: Vec::new(),
             compared: Vec::new(),
+            told_kept_chords: false,
             quiet: false,
             eigenvalue: f64::NAN,
+            levels: Vec::new(),
             budget: COMMAND_BUDGET,
             spent: 0,
             depth: 0,

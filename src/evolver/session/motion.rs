@@ -60,6 +60,8 @@ impl Session {
                         format!("refining would make {grown} elements; at most {MOST_ELEMENTS} are kept");
                     return scope.fail(position, message);
                 }
+                let energy = self.values()?.energy;
+                self.levels.push(energy);
                 self.surface.refine();
                 self.changed();
                 self.current()?;
@@ -79,6 +81,16 @@ impl Session {
             }
             Simple::Volumes => self.volumes(host)?,
             Simple::Counts => self.counts(host),
+            Simple::Extrapolate => self.extrapolate(host)?,
+            Simple::Variables => self.list_variables(host),
+            Simple::NamedQuantities => {
+                let mut text = "Quantities:\n".to_owned();
+                for (name, value, _) in self.quantities()? {
+                    // Writing to a string does not fail.
+                    let _ = writeln!(text, "{name:>32} {:>20}", significant(value, 15));
+                }
+                host.print(&text);
+            }
             Simple::PopNonminimal => return self.pop(true, scope, host),
             Simple::PopEdges => return self.pop(false, scope, host),
             Simple::ConjugateGradient(on) => {
@@ -165,6 +177,9 @@ impl Session {
                 self.descent.fixed = value.is_some_and(|v| !is_zero(v));
                 if let Some(value) = value.filter(|v| !is_zero(*v)) {
                     self.descent.scale = value;
+                    self.say(host, &format!("Scale fixed at {}.\n", significant(value, 6)));
+                } else {
+                    self.say(host, "Scale optimizing.\n");
                 }
                 Ok(())
             }
@@ -312,7 +327,8 @@ const HELP: &str = "\
 g N        N steps down the energy          r  refine        u  equiangulate    V  average vertices
 hessian    Newton step                      hessian_seek     saddle             ritz(value, count)
 slide      along the walls, as long as that lowers the energy
-v          volumes and pressures            e  counts        t l w K  threshold
+v          volumes and pressures            c  counts        t l w K  threshold
+e          energies by refinement           A  variables     Q  quantities
 print E    printf \"…\", a, b                 list vertices where …              set edge tension 2 where …
 M 1, M 2   linear, quadratic                dump \"file.fe\"   quit
 All of it: the table of supported commands in the documentation.

@@ -22,6 +22,12 @@ pub(super) struct Known {
     source: Option<Arc<Source>>,
 }
 
+impl Known {
+    pub(super) fn is_function(&self) -> bool {
+        self.routine.function
+    }
+}
+
 /// What functions have printed and written.
 #[derive(Debug, Default)]
 pub(super) struct Told {

@@ -10,11 +10,13 @@
 //! Hessian is stiffened until the step goes downhill on the constraints.
 
 mod film;
+mod fronts;
 mod layout;
 mod mode;
 mod motion;
 mod rigid;
 mod sparse;
+mod supernodes;
 pub(crate) mod symmetric;
 
 pub use mode::Mode;

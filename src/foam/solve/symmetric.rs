@@ -3,7 +3,7 @@
 //!
 //! For systems that are not made of films; a complex has its own layout (`layout.rs`).
 
-use super::sparse::FactorError;
+use super::{fronts::Fronts, sparse::FactorError, supernodes};
 use crate::index::checked_u32;
 use faer::{
     Conj, MatMut, Par, Side,
@@ -17,7 +17,7 @@ use faer::{
         },
     },
 };
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// The places of the entries of a matrix and the order in which it is factored.
 #[derive(Debug)]
@@ -27,6 +27,9 @@ pub(crate) struct SymmetricPattern {
     places: Vec<u32>,
     pattern: SymbolicSparseColMat<usize>,
     cholesky: SymbolicCholesky<usize>,
+    fronts: Option<Fronts>,
+    /// The values of a factor that is no longer in use: memory that is already at hand.
+    spare: Mutex<Vec<f64>>,
     size: usize,
 }
 
@@ -45,6 +48,9 @@ const REFINEMENTS: usize = 3;
 
 /// The residual, relative to the right side, at which a solution is good enough: Newton's next step takes out the rest.
 const REFINED: f64 = 1e-12;
+
+/// What a step of refinement may leave of a residual for another one to be worth its time.
+const WORTH: f64 = 0.1;
 
 /// What is taken off a zero diagonal, as a part of the largest entry: refinement restores ten digits at a step.
 const SOFTENING: f64 = 1e-10;
@@ -68,7 +74,15 @@ impl SymmetricPattern {
         let cholesky =
             factorize_symbolic_cholesky(pattern.as_ref(), Side::Lower, SymmetricOrdering::Amd, parameters)
                 .map_err(|_| memory)?;
-        Ok(Self { entries, places, pattern, cholesky, size })
+        let mut new =
+            Self { entries, places, pattern, cholesky, fronts: None, spare: Mutex::default(), size };
+        if let (SymbolicCholeskyRaw::Supernodal(blocks), Some(order)) =
+            (new.cholesky.raw(), new.cholesky.perm())
+        {
+            let columns = (0..size).flat_map(|column| new.column(column).map(move |(_, row)| (row, column)));
+            new.fronts = Fronts::new(blocks, order.arrays().1, columns);
+        }
+        Ok(new)
     }
 
     /// Whether this is the pattern of these entries.
@@ -81,34 +95,41 @@ impl SymmetricPattern {
     /// # Errors
     /// [`FactorError`] if a pivot vanishes or memory is short.
     pub(crate) fn factor(self: &Arc<Self>, entries: &[f64]) -> Result<SymmetricFactor, FactorError> {
-        let memory = FactorError::Memory { unknowns: self.size };
+        let singular = FactorError::Singular { unknowns: self.size };
         let mut matrix = vec![0.0; self.pattern.row_idx().len()];
         for (&place, value) in self.places.iter().zip(entries) {
             matrix[place as usize] += value;
         }
-        // The fronts of sheets are small: several threads wait for each other longer than they work.
-        let parallel = Par::Seq;
-        let mut values = vec![0.0; self.cholesky.len_val()];
-        let scratch = self.cholesky.factorize_numeric_ldlt_scratch::<f64>(parallel, Default::default());
-        let mut buffer = MemBuffer::try_new(scratch).map_err(|_| memory)?;
-        let mut factor = |matrix: &[f64]| {
-            self.cholesky
-                .factorize_numeric_ldlt(
-                    &mut values,
-                    SparseColMatRef::new(self.pattern.as_ref(), matrix),
-                    Side::Lower,
-                    Default::default(),
-                    parallel,
-                    MemStack::new(&mut buffer),
-                    Default::default(),
-                )
-                .map(|_| ())
+        let mut values = self.spare.lock().map(|mut spare| std::mem::take(&mut *spare)).unwrap_or_default();
+        values.resize(self.cholesky.len_val(), 0.0);
+        let mut factor = |matrix: &[f64]| match (&self.fronts, self.cholesky.raw()) {
+            (Some(fronts), SymbolicCholeskyRaw::Supernodal(blocks)) => {
+                fronts.factor(blocks, matrix, &mut values).map_err(|_| singular)
+            }
+            _ => self.factor_by_columns(matrix, &mut values),
         };
         factor(&matrix)
-            .or_else(|_| factor(&self.softened(&matrix)))
-            .map_err(|_| FactorError::Singular { unknowns: self.size })?;
+            .or_else(|error| if error == singular { factor(&self.softened(&matrix)) } else { Err(error) })?;
         let negative = self.negative_pivots(&values);
         Ok(SymmetricFactor { pattern: Arc::clone(self), matrix, values, negative })
+    }
+
+    fn factor_by_columns(&self, matrix: &[f64], values: &mut [f64]) -> Result<(), FactorError> {
+        let scratch = self.cholesky.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+        let mut buffer =
+            MemBuffer::try_new(scratch).map_err(|_| FactorError::Memory { unknowns: self.size })?;
+        self.cholesky
+            .factorize_numeric_ldlt(
+                values,
+                SparseColMatRef::new(self.pattern.as_ref(), matrix),
+                Side::Lower,
+                Default::default(),
+                Par::Seq,
+                MemStack::new(&mut buffer),
+                Default::default(),
+            )
+            .map(|_| ())
+            .map_err(|_| FactorError::Singular { unknowns: self.size })
     }
 
     /// The places of a column's entries, and their rows; the diagonal comes first where there is one.
@@ -187,6 +208,14 @@ fn by_columns(size: usize, entries: &[(u32, u32)]) -> (Vec<usize>, Vec<usize>, V
     (starts, rows, places)
 }
 
+impl Drop for SymmetricFactor {
+    fn drop(&mut self) {
+        if let Ok(mut spare) = self.pattern.spare.lock() {
+            *spare = std::mem::take(&mut self.values);
+        }
+    }
+}
+
 impl SymmetricFactor {
     /// The solution for one right side; not finite numbers where the matrix is as good as singular.
     ///
@@ -194,33 +223,47 @@ impl SymmetricFactor {
     /// [`FactorError::Memory`].
     pub(crate) fn solve(&self, rhs: &[f64]) -> Result<Vec<f64>, FactorError> {
         let size = rhs.len();
-        let factor = LdltRef::new(&self.pattern.cholesky, &self.values);
-        let scratch = self.pattern.cholesky.solve_in_place_scratch::<f64>(1, Par::Seq);
-        let mut buffer = MemBuffer::try_new(scratch).map_err(|_| FactorError::Memory { unknowns: size })?;
         let mut solution = vec![0.0; size];
         let mut residual = rhs.to_vec();
         let mut left = f64::INFINITY;
         let enough = REFINED * REFINED * rhs.iter().map(|x| x * x).sum::<f64>();
         for _ in 0..=REFINEMENTS {
-            let mut correction = residual.clone();
-            factor.solve_in_place_with_conj(
-                Conj::No,
-                MatMut::from_column_major_slice_mut(&mut correction, size, 1),
-                Par::Seq,
-                MemStack::new(&mut buffer),
-            );
+            let correction = self.correction(&residual)?;
             let candidate: Vec<f64> = solution.iter().zip(&correction).map(|(s, c)| s + c).collect();
             let next = self.residual(rhs, &candidate);
             let length = next.iter().map(|x| x * x).sum::<f64>();
             if length.is_nan() || length >= left {
                 break;
             }
+            let worth = length.sqrt() <= WORTH * left.sqrt();
             (solution, residual, left) = (candidate, next, length);
-            if left <= enough {
+            if left <= enough || !worth {
                 break;
             }
         }
         Ok(solution)
+    }
+
+    /// The solution to the digits that the factor has.
+    fn correction(&self, residual: &[f64]) -> Result<Vec<f64>, FactorError> {
+        let size = residual.len();
+        let cholesky = &self.pattern.cholesky;
+        if let (SymbolicCholeskyRaw::Supernodal(blocks), Some(order)) = (cholesky.raw(), cholesky.perm()) {
+            let (forward, back) = order.arrays();
+            let mut ordered: Vec<f64> = forward.iter().map(|&at| residual[at]).collect();
+            supernodes::solve(blocks, &self.values, &mut ordered);
+            return Ok(back.iter().map(|&at| ordered[at]).collect());
+        }
+        let scratch = cholesky.solve_in_place_scratch::<f64>(1, Par::Seq);
+        let mut buffer = MemBuffer::try_new(scratch).map_err(|_| FactorError::Memory { unknowns: size })?;
+        let mut correction = residual.to_vec();
+        LdltRef::new(cholesky, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(&mut correction, size, 1),
+            Par::Seq,
+            MemStack::new(&mut buffer),
+        );
+        Ok(correction)
     }
 
     /// What is left of `rhs` when the matrix times `x` is taken away.
