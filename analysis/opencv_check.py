@@ -141,7 +141,7 @@ def agreement(cells, sides, whole, table, pitch):
     """Cell by cell: complete ones of the program that OpenCV finds too, and those of the same count.
 
     Sides are compared where OpenCV has found every cell of the program around the cell, one for one: where it misses one,
-    its count says nothing of the program's.
+    its count says nothing of the program's. Where a wall is too short to decide, the program gives both values, and either agrees.
     """
     rows = [row for row in csv.DictReader(open(table, newline="", encoding="utf-8")) if row["status"] != "uncertain"]
     places = np.array([(float(row["x_px"]), float(row["y_px"])) for row in rows]).reshape(-1, 2)
@@ -166,8 +166,9 @@ def agreement(cells, sides, whole, table, pitch):
             continue
         compared += 1
         count = int(rows[index]["sides"])
-        same += sides[mate] == count
-        if sides[mate] != count:
+        agrees = sides[mate] == count or str(sides[mate]) == rows[index]["other_sides"]
+        same += agrees
+        if not agrees:
             differing.append({"x_px": places[index][0], "y_px": places[index][1], "ours": count, "opencv": sides[mate]})
     found = sum(index in partner for index in ours)
     return {

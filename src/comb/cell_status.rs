@@ -16,11 +16,10 @@ const LEAST_CLOSURE: f64 = 0.85;
 const LEAST_RISE: f64 = 0.5;
 /// Greatest raggedness of an outline that was seen from wall to wall.
 const GREATEST_RAGGEDNESS: f64 = 0.22;
-/// Area of a cell of fewer than six sides, and of more, over the mean of its neighbours': on flat comb about 0.7 to 1 and 1 to
-/// 1.5.
+/// Area of a cell of fewer than six sides, and of more, over that of its neighbours: on flat comb about 0.7 to 1 and 1 to 1.5.
 const GREATEST_PENTAGON: f64 = 1.05;
 const LEAST_HEPTAGON: f64 = 0.8;
-/// Above this share of its neighbours' mean area a cell is two of which one was missed: a drone's cell among workers' has 1.5.
+/// Above this share of its neighbours' area a cell is two of which one was missed: a drone's cell among workers' has 1.5.
 const GREATEST_SIZE: f64 = 1.6;
 /// Chance that a side is right whose neighbour is hidden, and whose neighbour lies beyond the photograph, from synthetic
 /// photographs (analysis/comb_accuracy/calibration.csv).
@@ -109,13 +108,19 @@ fn is_sized(reading: &Reading, cell: usize) -> bool {
     if reading.counts[cell].neighbours.len() < 6 { size < GREATEST_PENTAGON } else { size > LEAST_HEPTAGON }
 }
 
-/// Area of a cell over the mean of its neighbours'. The pitch is no measure of it: seen obliquely, cells are as wide as ever one
-/// way. Where they shrink from one to the next, the larger ones on one side make up for the smaller ones on the other.
+/// Area of a cell over that of its neighbours. The pitch is no measure of it: seen obliquely, cells are as wide as ever one way.
+/// Where comb is turned, cells shrink from one to the next, and the mean makes up for it: the neighbours on one side are larger, on
+/// the other smaller. Elsewhere the median does not mind a neighbour that got the pixels of the same missed cell.
 fn size(reading: &Reading, cell: usize) -> f64 {
     let whole = |n: &&usize| reading.kinds[**n] == Kind::Seen && !reading.cut[**n];
-    let areas = reading.counts[cell].neighbours.iter().filter(whole).map(|n| reading.regions[*n].area);
-    let (sum, count) = areas.fold((0.0, 0.0), |(sum, count), area| (sum + area, count + 1.0));
-    if sum > 0.0 { reading.regions[cell].area * count / sum } else { 1.0 }
+    let areas = || reading.counts[cell].neighbours.iter().filter(whole).map(|n| reading.regions[*n].area);
+    let usual = if narrowness(reading, cell) > TURNED {
+        let (sum, count) = areas().fold((0.0, 0.0), |(sum, count), area| (sum + area, count + 1.0));
+        sum / f64::max(count, 1.0)
+    } else {
+        median(areas())
+    };
+    if usual > 0.0 { reading.regions[cell].area / usual } else { 1.0 }
 }
 
 /// Whether a place beyond the comb lies within the photograph, so that a cell there would have been seen.
