@@ -6,8 +6,9 @@
 //! `E − p_b V_b − p_f V_f` of a film between the regions *b* (back) and *f* (front):
 //! `∫ γ|N| − r·N` with `N = a × b` and `r = (p_b − p_f)(x)/3 − (p_b o_b − p_f o_f)/3`, where `o` are the regions' origins.
 
-use super::complex::{Complex, MOST_NODES, Places, Shape, ShapePoint};
+use super::complex::{Complex, Film, MOST_NODES, Places, Shape, ShapePoint};
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 /// The matrix of `x ↦ v × x`.
 pub(crate) fn cross_matrix(v: DVec3) -> DMat3 {
@@ -109,52 +110,67 @@ pub(crate) fn is_folded(shape: Shape, nodes: &[DVec3]) -> bool {
 /// The energy of all films: tension times area.
 #[must_use]
 pub fn energy(complex: &Complex, places: &Places) -> f64 {
-    let mut nodes = Vec::with_capacity(9);
-    let mut total = 0.0;
-    for film in &complex.films {
-        let mut area = 0.0;
-        for element in &film.elements {
-            nodes.clear();
-            nodes.extend(element.nodes.iter().map(|&image| complex.place(places, image)));
-            area += element_area(element.shape, &nodes);
-        }
-        total += film.tension * area;
-    }
-    total
+    let of_film = |film: &Film| {
+        let mut nodes = [DVec3::ZERO; MOST_NODES];
+        let area: f64 = film
+            .elements
+            .iter()
+            .map(|element| {
+                let nodes = &mut nodes[..element.nodes.len()];
+                nodes
+                    .iter_mut()
+                    .zip(&element.nodes)
+                    .for_each(|(node, &image)| *node = complex.place(places, image));
+                element_area(element.shape, nodes)
+            })
+            .sum();
+        film.tension * area
+    };
+    // Summed in the films' order, whoever computed them.
+    let energies: Vec<f64> =
+        complex.films.as_slice().par_iter().with_min_len(LEAST_SHARE).map(of_film).collect();
+    energies.iter().sum()
 }
 
-/// Adds the gradient and the Hessian of an element's Lagrangian; `local` are the rows of its nodes. Gives its energy.
+/// Films that are worth a thread's while.
+const LEAST_SHARE: usize = 32;
+
+/// Adds the gradients of an element's Lagrangians at several loads, and the Hessian of the first; `local` are the rows of its
+/// nodes. Gives its energy at the first.
 pub(crate) fn add_element(
     shape: Shape,
     nodes: &[DVec3],
     local: &[usize],
-    loads: &FilmLoads,
-    gradient: &mut [DVec3],
+    loads: &[FilmLoads],
+    gradients: &mut [&mut [DVec3]],
     hessian: Option<&mut Blocks>,
 ) -> f64 {
     let mut energy = 0.0;
-    let mut lower = [[DMat3::ZERO; MOST_NODES]; MOST_NODES];
+    let mut lower = [[[0.0; 9]; MOST_NODES]; MOST_NODES];
+    let Some(first) = loads.first() else { return energy };
     for point in shape.points() {
         let (x, a, b) = jet(point, nodes);
         let normal = a.cross(b);
         let length = normal.length();
-        energy += point.weight * loads.tension * length;
         let unit = normal / length;
-        let third = loads.difference / 3.0;
-        let m = loads.tension * unit - (third * x - loads.moment);
-        let (gx, ga, gb) = (-third * normal, b.cross(m), m.cross(a));
-        for (i, &row) in local.iter().enumerate() {
-            gradient[row] += point.weight * (point.value[i] * gx + point.du[i] * ga + point.dv[i] * gb);
+        energy += point.weight * first.tension * length;
+        for (load, gradient) in loads.iter().zip(gradients.iter_mut()) {
+            let m = load.along(x, unit);
+            let (gx, ga, gb) = (-load.difference / 3.0 * normal, b.cross(m), m.cross(a));
+            for (i, &row) in local.iter().enumerate() {
+                gradient[row] += point.weight * (point.value[i] * gx + point.du[i] * ga + point.dv[i] * gb);
+            }
         }
         if hessian.is_none() {
             continue;
         }
         let (na, nb) = (-cross_matrix(b), cross_matrix(a));
-        let flat = (loads.tension / length) * (DMat3::IDENTITY - outer(unit, unit));
+        let flat = (first.tension / length) * (DMat3::IDENTITY - outer(unit, unit));
         let (ta, tb) = (na.transpose() * flat, nb.transpose() * flat);
+        let third = first.difference / 3.0;
         let second = Second {
             aa: ta * na,
-            ab: ta * nb - cross_matrix(m),
+            ab: ta * nb - cross_matrix(first.along(x, unit)),
             bb: tb * nb,
             xa: -third * na,
             xb: -third * nb,
@@ -163,14 +179,22 @@ pub(crate) fn add_element(
     }
     if let Some(hessian) = hessian {
         for (j, &column) in local.iter().enumerate() {
-            hessian.add(column, column, lower[j][j]);
+            let block = |i: usize| DMat3::from_cols_array(&lower[j][i]);
+            hessian.add(column, column, block(j));
             for (i, &row) in local.iter().enumerate().skip(j + 1) {
-                hessian.add(row, column, lower[j][i]);
-                hessian.add(column, row, lower[j][i].transpose());
+                hessian.add(row, column, block(i));
+                hessian.add(column, row, block(i).transpose());
             }
         }
     }
     energy
+}
+
+impl FilmLoads {
+    /// `γ n − r`: what the Lagrangian changes by with the area vector.
+    fn along(&self, x: DVec3, unit: DVec3) -> DVec3 {
+        self.tension * unit - (self.difference / 3.0 * x - self.moment)
+    }
 }
 
 /// Second derivatives by place and tangents at one point.
@@ -183,17 +207,21 @@ struct Second {
 }
 
 impl Second {
-    /// Adds the blocks on and below the diagonal, column by column.
-    fn scatter(&self, point: &ShapePoint, count: usize, lower: &mut [[DMat3; MOST_NODES]; MOST_NODES]) {
+    /// Adds the blocks on and below the diagonal, column by column; the entries of a block lie side by side, for the compiler
+    /// to make vectors of.
+    fn scatter(&self, point: &ShapePoint, count: usize, lower: &mut [[[f64; 9]; MOST_NODES]; MOST_NODES]) {
         let (ba, ax, bx) = (self.ab.transpose(), self.xa.transpose(), self.xb.transpose());
         for (j, column) in lower.iter_mut().enumerate().take(count) {
             let (n, u, v) =
                 (point.weight * point.value[j], point.weight * point.du[j], point.weight * point.dv[j]);
-            let x = u * self.xa + v * self.xb;
-            let a = n * ax + u * self.aa + v * self.ab;
-            let b = n * bx + u * ba + v * self.bb;
+            let x = (u * self.xa + v * self.xb).to_cols_array();
+            let a = (n * ax + u * self.aa + v * self.ab).to_cols_array();
+            let b = (n * bx + u * ba + v * self.bb).to_cols_array();
             for (i, block) in column.iter_mut().enumerate().take(count).skip(j) {
-                *block += point.value[i] * x + point.du[i] * a + point.dv[i] * b;
+                let (n, u, v) = (point.value[i], point.du[i], point.dv[i]);
+                for (at, entry) in block.iter_mut().enumerate() {
+                    *entry += n * x[at] + u * a[at] + v * b[at];
+                }
             }
         }
     }
@@ -242,14 +270,14 @@ mod tests {
             let local: Vec<usize> = (0..count).collect();
             let mut hessian = Blocks::zero(count);
             let mut gradient = vec![DVec3::ZERO; count];
-            add_element(shape, &nodes, &local, &LOADS, &mut gradient, Some(&mut hessian));
+            add_element(shape, &nodes, &local, &[LOADS], &mut [&mut gradient], Some(&mut hessian));
             let step = 1e-5;
             for column in 0..3 * count {
                 let moved = |sign: f64| {
                     let mut nodes = nodes.clone();
                     nodes[column / 3][column % 3] += sign * step;
                     let mut g = vec![DVec3::ZERO; count];
-                    add_element(shape, &nodes, &local, &LOADS, &mut g, None);
+                    add_element(shape, &nodes, &local, &[LOADS], &mut [&mut g], None);
                     (lagrangian(shape, &nodes), g)
                 };
                 let ((up, gu), (down, gd)) = (moved(1.0), moved(-1.0));

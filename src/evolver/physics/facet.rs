@@ -101,7 +101,7 @@ impl FacetField {
         let count = nodes.len();
         if let Self::Area = self {
             let loads = FilmLoads { tension: factor, difference: 0.0, moment: DVec3::ZERO };
-            add_element(shape, nodes, &ROWS[..count], &loads, gradient, hessian);
+            add_element(shape, nodes, &ROWS[..count], &[loads], &mut [gradient], hessian);
             return;
         }
         for point in self.points(shape) {

@@ -283,11 +283,10 @@ impl<'a> Sheet<'a> {
         };
         const ROWS: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
         let hessian = &mut share.hessian;
-        share.energy = add_element(element.shape, &y, &ROWS, &both[0], &mut share.gradient, Some(hessian));
-        add_element(element.shape, &y, &ROWS, &both[1], &mut share.volume, None);
+        let targets = &mut [&mut share.gradient[..], &mut share.volume[..]];
+        share.energy = add_element(element.shape, &y, &ROWS, &both, targets, Some(hessian));
         for (wall, edge) in self.complex.wall_edges(element) {
             let strip = WallEdge::new(&self.complex, reference, element, &absolute, wall, edge);
-            let targets = &mut [&mut share.gradient[..], &mut share.volume[..]];
             strip.add(&strips, base, edge, targets, Some(hessian));
         }
         for (at, &multiplier) in multipliers[1..].iter().enumerate() {

@@ -10,7 +10,7 @@ use crate::{
     foam::{
         complex::{Complex, Places, RegionId, RegionKind},
         energy::{self, energy},
-        solve::{FactorError, Mode, Residuals, Step, System},
+        solve::{Demand, FactorError, Mode, Residuals, Step, System},
         volume::{Reference, volumes},
     },
     index::IndexVec,
@@ -85,6 +85,12 @@ pub struct Descent {
     damping: f64,
 }
 
+/// What a merit is made of.
+struct Measured {
+    volumes: IndexVec<RegionId, f64>,
+    energy: f64,
+}
+
 /// The longest step of a node, in units of the cell size: beyond it films turn over before Newton's model holds.
 const LONGEST_STEP: f64 = 0.25;
 /// The part of an element's edge that one step may take away.
@@ -133,11 +139,36 @@ impl Descent {
         pressures: IndexVec<RegionId, f64>,
     ) -> Result<Self, FactorError> {
         let reference = Reference::new(&complex, &places);
+        Self::with_reference(complex, wanted, places, pressures, reference)
+    }
+
+    /// As [`Descent::new`], but with the volumes that wall patches hold only roughly known until
+    /// [`Descent::integrate_walls`]; see [`Reference::rough`].
+    ///
+    /// # Errors
+    /// [`FactorError::Memory`].
+    pub fn rough(
+        complex: Complex,
+        wanted: IndexVec<RegionId, f64>,
+        places: Places,
+        pressures: IndexVec<RegionId, f64>,
+    ) -> Result<Self, FactorError> {
+        let reference = Reference::rough(&complex, &places);
+        Self::with_reference(complex, wanted, places, pressures, reference)
+    }
+
+    fn with_reference(
+        complex: Complex,
+        wanted: IndexVec<RegionId, f64>,
+        places: Places,
+        pressures: IndexVec<RegionId, f64>,
+        reference: Reference,
+    ) -> Result<Self, FactorError> {
         let system = System::new(&complex, &places)?;
         let targets = wanted.clone();
         let mut descent =
             Self { complex, wanted, places, pressures, reference, system, targets, damping: 0.0 };
-        descent.targets = descent.fitted_targets();
+        descent.targets = descent.fitted_targets(&descent.volumes());
         Ok(descent)
     }
 
@@ -186,7 +217,7 @@ impl Descent {
     /// Integrates all wall patches where the films are now: small errors of the strips that were added since vanish.
     pub fn integrate_walls(&mut self) {
         self.reference = Reference::new(&self.complex, &self.places);
-        self.targets = self.fitted_targets();
+        self.targets = self.fitted_targets(&self.volumes());
         self.system.reframe(&self.complex, &self.places);
     }
 
@@ -212,12 +243,14 @@ impl Descent {
         let mut idle = 0;
         let mut pushes = 0;
         let mut steps = 0;
+        let mut measured = self.measured(&self.places);
         loop {
-            let now = self.volumes();
-            let aims = self.aims(&now);
+            let now = &measured.volumes;
+            let aims = self.aims(now);
             let excess = now.iter().zip(&aims).map(|(now, aim)| now - aim).collect();
-            let step = self.step(&excess)?;
-            let residuals = self.residuals(&step, &now, settings.length);
+            let volume = self.volume_residual(now);
+            let step = self.step(&excess, volume > FAR)?;
+            let residuals = Residuals { force: step.residuals.force / settings.length, volume };
             let unstable = step.unstable;
             let ended = |ending| Ok(Descended { ending, steps, residuals, unstable });
             let size =
@@ -233,22 +266,23 @@ impl Descent {
             if steps >= settings.step_limit {
                 return ended(Ending::StepLimit);
             }
-            let here = self.energy();
+            let here = measured.energy;
             idle = if size < 0.9 * best || here < lowest - FALL * here.abs() { 0 } else { idle + 1 };
             (best, lowest) = (best.min(size), lowest.min(here));
             if idle > IDLE_STEPS {
                 return ended(Ending::Stalled);
             }
-            let fraction = if size <= 1.0 {
+            let (fraction, taken) = if size <= 1.0 {
                 pushes += 1;
                 if pushes > MOST_PUSHES {
                     return ended(Ending::Stalled);
                 }
                 (best, lowest) = (f64::INFINITY, f64::INFINITY);
-                self.leave_saddle(settings.length)?
+                (self.leave_saddle(settings.length)?, None)
             } else {
-                self.take(&step, &aims, &residuals, settings.length)
+                self.take(&step, &aims, &residuals, &measured, settings.length)
             };
+            measured = taken.unwrap_or_else(|| self.measured(&self.places));
             steps += 1;
             if observer(&DescentStep { descent: self, residuals, fraction, unstable }).is_break() {
                 return Ok(Descended { ending: Ending::Halted, steps, residuals, unstable });
@@ -256,15 +290,15 @@ impl Descent {
         }
     }
 
-    fn step(&self, excess: &IndexVec<RegionId, f64>) -> Result<Step, FactorError> {
-        self.system.step_by(
-            &self.complex,
-            &self.places,
-            &self.reference,
-            &self.pressures,
-            excess,
-            self.damping,
-        )
+    fn measured(&self, places: &Places) -> Measured {
+        let volumes = volumes(&self.complex, places, &self.reference);
+        Measured { energy: energy(&self.complex, places), volumes }
+    }
+
+    fn step(&self, excess: &IndexVec<RegionId, f64>, balances: bool) -> Result<Step, FactorError> {
+        let Self { complex, places, reference, pressures, .. } = self;
+        let demand = Demand { excess, damping: self.damping, balances };
+        self.system.step_by(complex, places, reference, pressures, &demand)
     }
 
     /// The volumes that the next step aims at: the targets, or as far towards them as films bear in one step.
@@ -279,7 +313,8 @@ impl Descent {
         aims
     }
 
-    fn residuals(&self, step: &Step, now: &IndexVec<RegionId, f64>, length: f64) -> Residuals {
+    /// The largest volume error, relative to the mean volume.
+    fn volume_residual(&self, now: &IndexVec<RegionId, f64>) -> f64 {
         let worst = self
             .complex
             .regions
@@ -287,7 +322,7 @@ impl Descent {
             .filter(|(_, region)| region.kind == RegionKind::Cell)
             .map(|(id, _)| (now[id] - self.targets[id]).abs())
             .fold(0.0, |a: f64, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) });
-        Residuals { force: step.residuals.force / length, volume: worst / self.mean_target() }
+        worst / self.mean_target()
     }
 
     fn mean_target(&self) -> f64 {
@@ -300,50 +335,53 @@ impl Descent {
         if count > 0.0 { sum / count } else { 1.0 }
     }
 
-    /// Takes as much of a step as the elements bear and the merit allows. Gives the fraction taken: 0 if there is none; the
-    /// next step is stiffer then.
+    /// Takes as much of a step as the elements bear and the merit allows. Gives the fraction taken: 0 if there is none, and the
+    /// next step is stiffer then; and what was measured there on the way.
     fn take(
         &mut self,
         step: &Step,
         aims: &IndexVec<RegionId, f64>,
         residuals: &Residuals,
+        here: &Measured,
         length: f64,
-    ) -> f64 {
+    ) -> (f64, Option<Measured>) {
         let longest = self.longest_fraction(&step.displacements, length);
         let near = residuals.force < TRUSTED
             && residuals.volume < TRUSTED
             && step.unstable == 0
             && self.damping < MOST_DAMPING;
-        let start = if near { 0.0 } else { self.merit(step, aims, &self.places, length) };
+        let start = self.merit(step, aims, here, length);
         let mut fraction = longest;
         for _ in 0..HALVINGS {
-            if let Some(places) = self.system.moved(&self.complex, &self.places, step, fraction)
-                && self.keeps_elements(&places)
-                && (near || self.merit(step, aims, &places, length) <= start)
+            let moved = self.system.moved(&self.complex, &self.places, step, fraction);
+            if let Some(places) = moved.filter(|places| self.keeps_elements(places))
+                && let there = self.measured(&places)
+                && (near || self.merit(step, aims, &there, length) <= start)
             {
                 self.places = places;
                 let changes = if residuals.volume > FAR { &step.balance } else { &step.direction.pressures };
                 for (id, change) in changes.enumerated() {
                     self.pressures[id] += *change;
                 }
-                if self.moved_since_reference() > REBASE_AFTER * length {
+                let is_far = self.moved_since_reference() > REBASE_AFTER * length;
+                if is_far {
                     self.rebase();
                 }
                 let eased = self.damping / DAMPING_GROWTH;
                 self.damping = if eased < FIRST_DAMPING { 0.0 } else { eased };
-                return fraction;
+                return (fraction, (!is_far).then_some(there));
             }
             fraction *= 0.5;
         }
         self.damping = (self.damping * DAMPING_GROWTH).clamp(FIRST_DAMPING, MOST_DAMPING);
-        0.0
+        (0.0, None)
     }
 
     /// The augmented Lagrangian at the step's new pressures: a Newton step goes downhill on it if the penalty is stiff.
-    fn merit(&self, step: &Step, aims: &IndexVec<RegionId, f64>, places: &Places, length: f64) -> f64 {
-        let now = volumes(&self.complex, places, &self.reference);
+    fn merit(&self, step: &Step, aims: &IndexVec<RegionId, f64>, at: &Measured, length: f64) -> f64 {
         let stiffness = PENALTY / (length * self.mean_target());
-        let work: f64 = now
+        let work: f64 = at
+            .volumes
             .enumerated()
             .map(|(id, &volume)| {
                 let pressure = self.pressures[id] + step.direction.pressures[id];
@@ -356,7 +394,7 @@ impl Descent {
                 }
             })
             .sum();
-        energy(&self.complex, places) + work
+        at.energy + work
     }
 
     fn longest_fraction(&self, displacements: &Places, length: f64) -> f64 {
@@ -397,15 +435,16 @@ impl Descent {
 
     /// Integrates the wall patches anew and takes new frames.
     fn rebase(&mut self) {
-        self.reference = self.reference.moved(&self.complex, &self.places);
-        self.targets = self.fitted_targets();
+        let (reference, volumes) = self.reference.moved(&self.complex, &self.places);
+        self.reference = reference;
+        self.targets = self.fitted_targets(&volumes);
         self.system.reframe(&self.complex, &self.places);
     }
 
     /// The wanted volumes; in closed parts brought to the sum that the walls hold.
-    fn fitted_targets(&self) -> IndexVec<RegionId, f64> {
+    fn fitted_targets(&self, now: &IndexVec<RegionId, f64>) -> IndexVec<RegionId, f64> {
         let mut targets = self.wanted.clone();
-        self.fit(&mut targets, &self.volumes());
+        self.fit(&mut targets, now);
         targets
     }
 
@@ -430,7 +469,7 @@ impl Descent {
             .into_iter()
             .filter_map(|push| self.system.moved(&self.complex, &self.places, &step, push))
             .filter(|places| self.keeps_elements(places))
-            .map(|places| (self.merit(&step, &self.targets, &places, length), places))
+            .map(|places| (self.merit(&step, &self.targets, &self.measured(&places), length), places))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, places)) = best {
             self.set_places(places);

@@ -20,6 +20,8 @@ const COARSE_TOLERANCE: f64 = 1e-4;
 const SPREAD_TOLERANCE: f64 = 1e-5;
 /// Spreading nodes and converging again, at most so often: each time the nodes move a tenth as far.
 const SPREADINGS: usize = 5;
+/// Passes of each: along rows and columns in turn they, too, even out by a factor of some ten.
+const PASSES: usize = 6;
 /// Nodes that move less than this part of the cell width need not be spread again.
 const EVEN_ENOUGH: f64 = 1e-6;
 
@@ -139,7 +141,7 @@ impl<'a> Run<'a> {
                 (Ending::Halted, Some(Halt::Turn)) if self.turn_corners()? => patience = steps + SPREAD_FOR,
                 (Ending::Halted, Some(Halt::Turn)) => return Ok(Some(Stop::Stalled { steps, residual })),
                 (Ending::Halted, Some(Halt::Spread)) => {
-                    self.spread();
+                    self.spread(1);
                 }
                 (Ending::Halted, _) => return Ok(Some(Stop::Interrupted { steps })),
             }
@@ -235,10 +237,13 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Spreads the nodes evenly along the films. Gives the largest move.
-    fn spread(&mut self) -> f64 {
+    /// Spreads the nodes evenly along the films, in at most so many passes. Gives the largest move of the first.
+    fn spread(&mut self, passes: usize) -> f64 {
         let mut places = self.state.places.clone();
-        let moved = self.state.strips.spread_evenly(&self.state.network, &mut places);
+        let mut spread = || self.state.strips.spread_evenly(&self.state.network, &mut places);
+        let moved = spread();
+        let even = EVEN_ENOUGH * self.state.cell_width();
+        let _ = (1..passes).find(|_| spread() <= even);
         if self.descent.complex().retract(&mut places).is_ok() {
             self.state.places.clone_from(&places);
             self.descent.set_places(places);
@@ -260,7 +265,7 @@ impl<'a> Run<'a> {
         }
         let mut last = false;
         for round in 1..=SPREADINGS {
-            let moved = self.spread();
+            let moved = self.spread(PASSES);
             last |= moved <= EVEN_ENOUGH * self.state.cell_width() || round == SPREADINGS;
             if last {
                 self.descent.integrate_walls();

@@ -76,14 +76,15 @@ impl State {
         })
     }
 
-    /// The descent from the present places.
+    /// The descent from the present places, with wall patches good to 1e-5 of a cell's volume: they are integrated anew where
+    /// volumes count.
     pub(crate) fn descent(&self, gap: &Gap) -> Result<Descent, FactorError> {
         let complex = self.strips.complex(&self.network, gap);
         let mut places = self.places.clone();
         // A node that finds no wall stays where it is; the descent's residuals tell.
         let _ = complex.retract(&mut places);
         let shares = self.shares.iter().copied().collect();
-        Descent::new(complex, shares, places, self.pressures.clone())
+        Descent::rough(complex, shares, places, self.pressures.clone())
     }
 
     /// Takes over one step of a descent.

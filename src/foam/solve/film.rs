@@ -19,7 +19,7 @@ use faer::{
         solvers::Lblt,
         triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place},
     },
-    prelude::Solve,
+    prelude::{Reborrow, ReborrowMut, Solve},
 };
 use glam::{DMat3, DVec3};
 
@@ -37,7 +37,7 @@ pub(super) struct At<'a> {
 pub(super) struct FilmHessian {
     hessian: Mat<f64>,
     /// The derivatives of minus the volumes of back and front.
-    volumes: [Mat<f64>; 2],
+    volumes: [Vec<f64>; 2],
     /// The gradient of the Lagrangian.
     pub(super) gradient: Vec<f64>,
     /// The gradient by the places of the bounding nodes, with what slaved nodes pass on.
@@ -63,9 +63,9 @@ impl FilmSystem {
     /// The motions of the inner nodes that `load` on them causes with all other unknowns held.
     pub(super) fn inner_answer(&self, load: &[f64]) -> Vec<f64> {
         let Some(factor) = &self.factor else { return Vec::new() };
-        let mut x = Mat::from_fn(load.len(), 1, |i, _| load[i]);
-        factor.solve_in_place(x.as_mut());
-        (0..load.len()).map(|i| x[(i, 0)]).collect()
+        let mut x = load.to_vec();
+        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut x, load.len(), 1));
+        x
     }
 
     /// What inner motions pass on to the film's unknowns.
@@ -83,15 +83,30 @@ impl FilmSystem {
     }
 }
 
+/// Memory for one film after another.
+pub(super) struct Scratch {
+    /// The Hessian by the places of the nodes.
+    hessian: Blocks,
+    /// The displacements of the nodes for units of freedoms and inner motions, by columns; and the Hessian times these.
+    map: Vec<f64>,
+    moved: Vec<f64>,
+}
+
+impl Scratch {
+    pub(super) fn new() -> Self {
+        Self { hessian: Blocks::zero(0), map: Vec::new(), moved: Vec::new() }
+    }
+}
+
 /// Gradients by the places of the film's nodes: of the Lagrangian, and of minus the volumes of back and front.
 struct NodeShares {
     lagrangian: Vec<DVec3>,
     back: Vec<DVec3>,
     front: Vec<DVec3>,
-    hessian: Blocks,
 }
 
-fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout) -> NodeShares {
+/// The gradients, and the Hessian into `hessian`.
+fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout, hessian: &mut Blocks) -> NodeShares {
     let count = layout.nodes.len();
     let base = at.complex.place(at.places, layout.nodes[0]);
     let [back, front] = at.reference.origins(at.complex, film).map(|origin| origin - base);
@@ -107,8 +122,8 @@ fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout) -> NodeShares {
         lagrangian: vec![DVec3::ZERO; count],
         back: vec![DVec3::ZERO; count],
         front: vec![DVec3::ZERO; count],
-        hessian: Blocks::zero(count),
     };
+    hessian.restart(count);
     let mut absolute = Vec::with_capacity(9);
     let mut local = Vec::with_capacity(9);
     for (element, rows) in film.elements.iter().zip(&layout.rows) {
@@ -116,26 +131,23 @@ fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout) -> NodeShares {
         absolute.extend(element.nodes.iter().map(|&image| at.complex.place(at.places, image)));
         local.clear();
         local.extend(absolute.iter().map(|&p| p - base));
-        let NodeShares { lagrangian, back, front, hessian } = &mut shares;
-        add_element(element.shape, &local, rows, &all[0], lagrangian, Some(hessian));
-        add_element(element.shape, &local, rows, &all[1], back, None);
-        add_element(element.shape, &local, rows, &all[2], front, None);
+        let NodeShares { lagrangian, back, front } = &mut shares;
+        let targets = &mut [&mut lagrangian[..], &mut back[..], &mut front[..]];
+        add_element(element.shape, &local, rows, &all, targets, Some(&mut *hessian));
         for (wall, edge) in at.complex.wall_edges(element) {
             let strip = WallEdge::new(at.complex, at.reference, element, &absolute, wall, edge);
             let edge_rows: Vec<usize> = edge.iter().map(|&node| rows[node]).collect();
-            let targets = &mut [&mut lagrangian[..], &mut back[..], &mut front[..]];
-            strip.add(&strips, base, &edge_rows, targets, Some(hessian));
+            strip.add(&strips, base, &edge_rows, targets, Some(&mut *hessian));
         }
     }
     shares
 }
 
-/// The displacements of the film's nodes for units of its freedoms and of its inner motions, and the wall projections of the
-/// inner nodes.
-fn displacements(at: &At<'_>, layout: &FilmLayout) -> (Mat<f64>, Vec<DMat3>) {
+/// The displacements of the film's nodes for units of its freedoms and of its inner motions, into `map`; gives the wall
+/// projections of the inner nodes.
+fn displacements(at: &At<'_>, layout: &FilmLayout, mut map: MatMut<'_, f64>) -> Vec<DMat3> {
     let outer = layout.freedoms.len();
-    let mut map = Mat::<f64>::zeros(3 * layout.nodes.len(), outer + layout.inner.len());
-    let add = |map: &mut Mat<f64>, row: usize, column: usize, d: DVec3| {
+    let add = |map: &mut MatMut<'_, f64>, row: usize, column: usize, d: DVec3| {
         for axis in 0..3 {
             map[(3 * row + axis, column)] += d[axis];
         }
@@ -169,7 +181,7 @@ fn displacements(at: &At<'_>, layout: &FilmLayout) -> (Mat<f64>, Vec<DMat3>) {
         add(&mut map, row, outer + own, projection * at.frames.axis(image.node));
         projections.push(projection);
     }
-    (map, projections)
+    projections
 }
 
 /// The masters of an inner node that bound films.
@@ -182,17 +194,30 @@ fn bounding_masters<'a>(complex: &'a Complex, node: &'a Node) -> impl Iterator<I
 }
 
 /// Assembles a film.
-pub(super) fn assemble(at: &At<'_>, film: &Film, layout: &FilmLayout) -> FilmHessian {
-    let mut shares = node_shares(at, film, layout);
-    let (map, projections) = displacements(at, layout);
-    let forces = forces(at, layout, &projections, &mut shares);
-    let flat = |nodes: &[DVec3]| Mat::from_fn(3 * nodes.len(), 1, |i, _| nodes[i / 3][i % 3]);
-    let pull = |nodes: &[DVec3]| times(map.transpose(), flat(nodes).as_ref());
-    let (gradient, back, front) = (pull(&shares.lagrangian), pull(&shares.back), pull(&shares.front));
-    let moved = times(shares.hessian.as_mat(), map.as_ref());
-    let hessian = times(map.transpose(), moved.as_ref());
-    let gradient = (0..gradient.nrows()).map(|i| gradient[(i, 0)]).collect();
-    FilmHessian { hessian, volumes: [back, front], gradient, forces }
+pub(super) fn assemble(at: &At<'_>, film: &Film, layout: &FilmLayout, scratch: &mut Scratch) -> FilmHessian {
+    let Scratch { hessian, map, moved } = scratch;
+    let (rows, columns) = (3 * layout.nodes.len(), layout.freedoms.len() + layout.inner.len());
+    for memory in [&mut *map, &mut *moved] {
+        memory.clear();
+        memory.resize(rows * columns, 0.0);
+    }
+    let shares = node_shares(at, film, layout, hessian);
+    let projections = displacements(at, layout, MatMut::from_column_major_slice_mut(map, rows, columns));
+    let forces = forces(at, layout, &projections, &shares.lagrangian, hessian);
+    let pull = |nodes: &[DVec3]| -> Vec<f64> {
+        let along = |column: &[f64]| {
+            nodes.iter().zip(column.chunks_exact(3)).map(|(n, d)| n.dot(DVec3::from_slice(d))).sum()
+        };
+        map.chunks_exact(rows).map(along).collect()
+    };
+    let gradient = pull(&shares.lagrangian);
+    let volumes = [pull(&shares.back), pull(&shares.front)];
+    let map = MatRef::from_column_major_slice(map, rows, columns);
+    let mut moved = MatMut::from_column_major_slice_mut(moved, rows, columns);
+    matmul(moved.rb_mut(), Accum::Replace, hessian.as_mat(), map, 1.0, Par::Seq);
+    let mut own = Mat::zeros(columns, columns);
+    matmul(own.as_mut(), Accum::Replace, map.transpose(), moved.rb(), 1.0, Par::Seq);
+    FilmHessian { hessian: own, volumes, gradient, forces }
 }
 
 /// The forces on bounding nodes, with what the inner nodes pass on to them; the walls' curvature under the inner nodes goes
@@ -201,17 +226,18 @@ fn forces(
     at: &At<'_>,
     layout: &FilmLayout,
     projections: &[DMat3],
-    shares: &mut NodeShares,
+    lagrangian: &[DVec3],
+    hessian: &mut Blocks,
 ) -> Vec<(NodeId, DVec3)> {
     let is_inner = |node: NodeId| matches!(at.complex.nodes[node].motion, Motion::Inner(_));
     let mut forces: Vec<(NodeId, DVec3)> = layout
         .nodes
         .iter()
-        .zip(&shares.lagrangian)
+        .zip(lagrangian)
         .filter(|(image, _)| !is_inner(image.node))
         .map(|(image, &force)| (image.node, force))
         .collect();
-    let mut on_inner: Vec<DVec3> = layout.inner.iter().map(|&row| shares.lagrangian[row]).collect();
+    let mut on_inner: Vec<DVec3> = layout.inner.iter().map(|&row| lagrangian[row]).collect();
     // Slaves before their masters: what they pass on presses the masters against their walls, too.
     for (own, &row) in layout.inner.iter().enumerate().rev() {
         let image = layout.nodes[row];
@@ -219,7 +245,7 @@ fn forces(
         let force = on_inner[own];
         if !node.walls.is_empty() {
             let curvature = wall_curvature(at.complex, node, at.places[image.node], force);
-            shares.hessian.add(row, row, curvature);
+            hessian.add(row, row, curvature);
         }
         let passed = projections[own] * force;
         forces.extend(bounding_masters(at.complex, node).map(|&(master, weight)| (master, weight * passed)));
@@ -228,12 +254,6 @@ fn forces(
         }
     }
     forces
-}
-
-fn times(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
-    let mut product = Mat::zeros(a.nrows(), b.ncols());
-    matmul(product.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
-    product
 }
 
 /// Condenses a film, with `shift` added to the diagonal of its inner block.
@@ -246,11 +266,11 @@ pub(super) fn condense(layout: &FilmLayout, film: &FilmHessian, shift: f64) -> F
     coupling.as_mut().submatrix_mut(0, 0, inner, outer).copy_from(hessian.submatrix(outer, 0, inner, outer));
     for (side, volume) in film.volumes.iter().enumerate() {
         for j in 0..outer {
-            matrix[(outer + side, j)] = volume[(j, 0)];
-            matrix[(j, outer + side)] = volume[(j, 0)];
+            matrix[(outer + side, j)] = volume[j];
+            matrix[(j, outer + side)] = volume[j];
         }
         for i in 0..inner {
-            coupling[(i, outer + side)] = volume[(outer + i, 0)];
+            coupling[(i, outer + side)] = volume[outer + i];
         }
     }
     let mut block = hessian.submatrix(outer, outer, inner, inner).to_owned();

@@ -4,9 +4,8 @@
 use super::rigid;
 use crate::{
     foam::complex::{Complex, Film, Motion, NodeId, NodeImage, Places, RegionId, RegionKind},
-    index::{Id, IndexVec},
+    index::{Id, IndexVec, checked_u32},
 };
-use faer::sparse::{Argsort, Pair, SymbolicSparseColMat};
 use std::collections::BTreeMap;
 
 /// The nodes and freedoms of a film.
@@ -45,8 +44,8 @@ pub(super) struct Layout {
     pub(super) closed_parts: Vec<Vec<RegionId>>,
     /// All nodes, masters before their slaves.
     pub(super) order_of_motion: Vec<NodeId>,
-    pub(super) pattern: SymbolicSparseColMat<usize>,
-    pub(super) order: Argsort<usize>,
+    /// The matrix's entries, row and column: each film's, each bounding node's own block, the diagonal.
+    pub(super) entries: Vec<(u32, u32)>,
 }
 
 impl Layout {
@@ -92,7 +91,7 @@ impl Layout {
             .iter()
             .map(|film| film_layout(complex, film, &depths, &freedoms, &of_freedom, &of_pressure))
             .collect();
-        let (pattern, order) = pattern(&films, &freedoms, &of_freedom, unknowns);
+        let entries = entries(&films, &freedoms, &of_freedom, unknowns);
         Self {
             freedoms,
             of_freedom,
@@ -102,8 +101,7 @@ impl Layout {
             films,
             closed_parts,
             order_of_motion,
-            pattern,
-            order,
+            entries,
         }
     }
 }
@@ -220,25 +218,22 @@ fn film_layout(
 
 /// The lower triangle's entries in the order in which values are given: each film's, each bounding node's own block, the
 /// diagonal.
-fn pattern(
+fn entries(
     films: &[FilmLayout],
     freedoms: &IndexVec<NodeId, (usize, usize)>,
     of_freedom: &[Option<usize>],
     unknowns: usize,
-) -> (SymbolicSparseColMat<usize>, Argsort<usize>) {
+) -> Vec<(u32, u32)> {
+    let pair = |(_, _, row, column)| (checked_u32(row), checked_u32(column));
     let mut entries = Vec::new();
     for film in films {
-        entries.extend(lower_pairs(&film.unknowns).map(|(_, _, row, column)| Pair::new(row, column)));
+        entries.extend(lower_pairs(&film.unknowns).map(pair));
     }
     for &(first, own) in freedoms {
-        let block = &of_freedom[first..first + own];
-        entries.extend(lower_pairs(block).map(|(_, _, row, column)| Pair::new(row, column)));
+        entries.extend(lower_pairs(&of_freedom[first..first + own]).map(pair));
     }
-    entries.extend((0..unknowns).map(|at| Pair::new(at, at)));
-    match SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, &entries) {
-        Ok(built) => built,
-        Err(error) => unreachable!("all entries lie inside the matrix: {error:?}"),
-    }
+    entries.extend((0..unknowns).map(|at| pair((at, at, at, at))));
+    entries
 }
 
 /// All pairs of places in `unknowns` on or below the diagonal of the matrix: the two places, then row and column.

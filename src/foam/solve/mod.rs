@@ -28,7 +28,7 @@ use super::{
 };
 use crate::index::IndexVec;
 pub(in crate::foam) use film::negative_eigenvalues;
-use film::{At, FilmHessian, FilmSystem};
+use film::{At, FilmHessian, FilmSystem, Scratch};
 use glam::DVec3;
 use layout::{Layout, lower_pairs};
 use motion::{Frames, Motions};
@@ -87,6 +87,17 @@ pub struct Step {
     pub shift: f64,
 }
 
+/// What a step is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Demand<'a> {
+    /// The volumes that the cells have too much.
+    pub excess: &'a IndexVec<RegionId, f64>,
+    /// The least that is added to the Hessian's diagonal.
+    pub damping: f64,
+    /// Whether [`Step::balance`] is wanted: it takes a solution of its own. Otherwise it is the change of pressures of the step.
+    pub balances: bool,
+}
+
 /// The stiffening starts at this part of the tension and grows fourfold: film Hessians have diagonals of the order of γ. A step
 /// grows along a falling direction by about its curvature over what is left of the stiffening: one far too stiff creeps.
 const FIRST_SHIFT: f64 = 1e-3;
@@ -133,7 +144,7 @@ impl System {
             .as_slice()
             .par_iter()
             .zip(&self.layout.films)
-            .map(|(film, layout)| film::assemble(at, film, layout))
+            .map_init(Scratch::new, |scratch, (film, layout)| film::assemble(at, film, layout, scratch))
             .collect()
     }
 
@@ -212,10 +223,11 @@ impl System {
     ) -> Result<Step, FactorError> {
         let now = volumes(complex, places, reference);
         let excess = now.iter().zip(targets).map(|(now, target)| now - target).collect();
-        self.step_by(complex, places, reference, pressures, &excess, damping)
+        let demand = Demand { excess: &excess, damping, balances: true };
+        self.step_by(complex, places, reference, pressures, &demand)
     }
 
-    /// As [`System::step`], with the volumes that the cells have too much.
+    /// As [`System::step`], for what is asked.
     ///
     /// # Errors
     /// As [`System::step`].
@@ -225,9 +237,9 @@ impl System {
         places: &Places,
         reference: &Reference,
         pressures: &IndexVec<RegionId, f64>,
-        excess: &IndexVec<RegionId, f64>,
-        damping: f64,
+        demand: &Demand<'_>,
     ) -> Result<Step, FactorError> {
+        let &Demand { excess, damping, balances } = demand;
         let motions = Motions::new(complex, places, &self.layout, &self.frames);
         let at = At { complex, places, reference, pressures, motions: &motions, frames: &self.frames };
         let assembled = self.assemble(&at);
@@ -237,9 +249,13 @@ impl System {
         forces.pressures.iter_mut().for_each(|missing| *missing = 0.0);
         let mut solution = None;
         let (unstable, shift) = self.stiffened(&assembled, &walls, damping, |factored, films| {
+            let balance = |direction: &Direction| match balances {
+                true => self.solve(factored, films, &forces).map(|balance| balance.pressures),
+                false => Ok(direction.pressures.clone()),
+            };
             solution = self
                 .solve(factored, films, &rhs)
-                .and_then(|direction| Ok((direction, self.solve(factored, films, &forces)?.pressures)))
+                .and_then(|direction| balance(&direction).map(|balance| (direction, balance)))
                 .ok()
                 .filter(|(direction, _)| direction.freedoms.iter().all(|x| x.is_finite()));
             solution.is_some()
@@ -306,7 +322,7 @@ impl System {
         let films = self.condense(assembled, shift);
         let softening = self.softening(&films);
         let entries = self.entries(&films, walls, shift);
-        let factored = Factored::new(&self.layout, &self.symbolic, entries, &softening).ok();
+        let factored = Factored::new(&self.symbolic, entries, &softening).ok();
         let inner: usize = films.iter().map(|film| film.negative).sum();
         let negative = |found: &Factored<'_>| (found.negative + inner).saturating_sub(self.layout.pressures);
         let extra = factored.as_ref().map_or(1, negative);

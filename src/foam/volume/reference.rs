@@ -5,7 +5,7 @@ use super::{
         Complex, CurvePoint, Element, Film, NodeId, Places, RegionId, RegionKind, WallId, curve_points,
         region_anchors,
     },
-    wall::height,
+    wall::foot as wall_foot,
 };
 use crate::{
     index::{Id, IndexVec},
@@ -15,14 +15,17 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
-/// Gauss points along an edge and outward from the anchor's foot in a fan. The wall is analytic and a cell turns by less than
-/// a right angle from its middle: twelve points reach rounding there.
-const FAN_ALONG: usize = 6;
-const FAN_OUTWARD: usize = 12;
+/// Gauss points of a fan along an edge and outward from the anchor's foot.
+type Fan = ([Vec<CurvePoint>; 2], Vec<CurvePoint>);
 
-static CURVES: LazyLock<[Vec<CurvePoint>; 2]> =
-    LazyLock::new(|| [curve_points(2, FAN_ALONG), curve_points(3, FAN_ALONG)]);
-static OUTWARD: LazyLock<Vec<CurvePoint>> = LazyLock::new(|| curve_points(2, FAN_OUTWARD));
+fn fan(along: usize, outward: usize) -> Fan {
+    ([curve_points(2, along), curve_points(3, along)], curve_points(2, outward))
+}
+
+/// The wall is analytic and a cell turns by less than a right angle from its middle: twelve points outward reach rounding there.
+static FINE: LazyLock<Fan> = LazyLock::new(|| fan(6, 12));
+/// Good to some 1e-5 of a cell's volume.
+static ROUGH: LazyLock<Fan> = LazyLock::new(|| fan(3, 5));
 
 /// Where the wall edges were when the wall patches were last integrated.
 #[derive(Clone, Debug)]
@@ -37,20 +40,32 @@ impl Reference {
     /// Takes the present places as the reference and integrates every region's wall patches.
     #[must_use]
     pub fn new(complex: &Complex, places: &Places) -> Self {
+        Self::integrated(complex, places, &FINE)
+    }
+
+    /// As [`Reference::new`] with a sixth of the work and volumes good to some 1e-5: for films on their way to where the
+    /// patches are integrated anew.
+    #[must_use]
+    pub fn rough(complex: &Complex, places: &Places) -> Self {
+        Self::integrated(complex, places, &ROUGH)
+    }
+
+    fn integrated(complex: &Complex, places: &Places, fan: &Fan) -> Self {
         let mut reference = Self::without_patches(complex, places);
-        reference.offsets = reference.patches(complex);
+        reference.offsets = reference.patches(complex, fan);
         reference
     }
 
-    /// The reference at other places of the same complex. The wall patches are not integrated anew: they differ from the old
-    /// ones by strips, whose quadrature errs by less than 1e-9 of a cell's volume for moves of a tenth of its width.
+    /// The reference at other places of the same complex, and the volumes there. The wall patches are not integrated anew: they
+    /// differ from the old ones by strips, whose quadrature errs by less than 1e-9 of a cell's volume for moves of a tenth of
+    /// its width.
     #[must_use]
-    pub fn moved(&self, complex: &Complex, places: &Places) -> Self {
+    pub fn moved(&self, complex: &Complex, places: &Places) -> (Self, IndexVec<RegionId, f64>) {
         let mut moved = Self::without_patches(complex, places);
         let volumes = super::volumes(complex, places, self);
         let cones = super::volumes(complex, places, &moved);
         moved.offsets = volumes.iter().zip(&cones).map(|(volume, cone)| volume - cone).collect();
-        moved
+        (moved, volumes)
     }
 
     fn without_patches(complex: &Complex, places: &Places) -> Self {
@@ -98,7 +113,7 @@ impl Reference {
         self.directions[node][slot]
     }
 
-    fn patches(&self, complex: &Complex) -> IndexVec<RegionId, f64> {
+    fn patches(&self, complex: &Complex, fan: &Fan) -> IndexVec<RegionId, f64> {
         // The feet of the anchors on each wall that a region has an edge on.
         let shares: Vec<[f64; 2]> = complex
             .films
@@ -111,7 +126,7 @@ impl Reference {
                     for (wall, edge) in complex.wall_edges(element) {
                         for (side, image) in [film.back, film.front].into_iter().enumerate() {
                             if complex.regions[image.region].kind == RegionKind::Cell {
-                                share[side] += self.fan(complex, element, wall, edge, anchors[side]);
+                                share[side] += self.cone(fan, complex, element, wall, edge, anchors[side]);
                             }
                         }
                     }
@@ -128,8 +143,9 @@ impl Reference {
     }
 
     /// The cone from `anchor` over the wall between the anchor's foot and an edge.
-    fn fan(
+    fn cone(
         &self,
+        (curves, outwards): &Fan,
         complex: &Complex,
         element: &Element,
         wall_id: WallId,
@@ -142,7 +158,7 @@ impl Reference {
         let node = |slot: usize| complex.place(&self.places, element.nodes[edge[slot]]);
         let direction = |slot: usize| self.direction(complex, element.nodes[edge[slot]].node, wall_id);
         let mut total = 0.0;
-        for curve in &CURVES[edge.len() - 2] {
+        for curve in &curves[edge.len() - 2] {
             let mut at = [DVec3::ZERO; 4];
             for slot in 0..edge.len() {
                 at[0] += curve.value[slot] * node(slot);
@@ -152,13 +168,13 @@ impl Reference {
             }
             let [e, et, d1, d1t] = at;
             let mut z = 0.0;
-            for outward in OUTWARD.iter() {
+            for outward in outwards {
                 let s = outward.value[1];
                 let y = foot + s * (e - foot);
                 let (ys, yt) = (e - foot, s * et);
                 let d = foot_direction + s * (d1 - foot_direction);
                 let (ds, dt) = (d1 - foot_direction, s * d1t);
-                z = height(wall, y, d, z);
+                (z, _) = wall_foot(wall, y, d, z);
                 let area = ys.cross(yt);
                 let bend = ds.cross(yt) + ys.cross(dt);
                 let prism =

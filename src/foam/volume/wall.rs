@@ -13,7 +13,7 @@ use super::{
     },
     Reference,
 };
-use crate::surface::Wall;
+use crate::surface::{Jet, Wall};
 use glam::{DMat3, DVec3};
 use std::sync::LazyLock;
 
@@ -25,31 +25,34 @@ const ACROSS: usize = 3;
 /// Steps of the search for the wall along a direction.
 const FOOT_STEPS: usize = 30;
 
+/// A step this short against the wall's radius of curvature is the last: Halley's steps shrink to the third power, and the
+/// jet is carried to their end to second order.
+const LAST_STEP: f64 = 1e-6;
+
 static CURVES: LazyLock<[Vec<CurvePoint>; 2]> =
     LazyLock::new(|| [curve_points(2, ALONG), curve_points(3, ALONG)]);
 static RULE: LazyLock<Vec<CurvePoint>> = LazyLock::new(|| curve_points(2, ACROSS));
 
-/// The height of a wall over `y` along `direction`: `z` with `y + z·direction` on the wall; not a number if none is found.
-pub(super) fn height(wall: &Wall, y: DVec3, direction: DVec3, guess: f64) -> f64 {
+/// The height of a wall over `y` along `direction`: `z` with `y + z·direction` on the wall, by Halley's steps; and the jet
+/// there. Not numbers if none is found.
+pub(super) fn foot(wall: &Wall, y: DVec3, direction: DVec3, guess: f64) -> (f64, Jet) {
     let mut z = guess;
-    let mut last = f64::INFINITY;
     for _ in 0..FOOT_STEPS {
-        let p = y + z * direction;
-        let (value, gradient) = wall.field.value_and_gradient(p);
-        let step = (value - wall.level) / gradient.dot(direction);
-        z -= step;
-        // Newton steps shrink quadratically until rounding: after one of 1e-10 nothing is left, and a wall whose value is
-        // rounded may never get there.
-        let size = step.abs();
-        if size <= 1e-10 || (size < 1e-8 && size >= 0.5 * last) {
-            return z;
+        let jet = wall.field.jet(y + z * direction);
+        let bend = jet.hessian * direction;
+        let (value, slope, second) =
+            (jet.value - wall.level, jet.gradient.dot(direction), bend.dot(direction));
+        let step = -2.0 * value * slope / (2.0 * slope * slope - value * second);
+        z += step;
+        if step.abs() * bend.length() <= LAST_STEP * slope.abs() {
+            return (z, Jet { value: wall.level, gradient: jet.gradient + step * bend, ..jet });
         }
-        if !size.is_finite() {
+        if !step.is_finite() {
             break;
         }
-        last = size;
     }
-    if last < 1e-9 { z } else { f64::NAN }
+    let nothing = Jet { value: f64::NAN, gradient: DVec3::NAN, hessian: DMat3::NAN };
+    (f64::NAN, nothing)
 }
 
 /// An edge of an element on a wall: reference and present nodes, and the directions at them.
@@ -72,17 +75,41 @@ pub(crate) struct StripLoads {
     pub(crate) moment: DVec3,
 }
 
-/// What is needed of the geometry at one quadrature point.
-struct StripPoint<'a> {
+/// The geometry across the strip at one place along the edge.
+struct StripRow<'a> {
     curve: &'a CurvePoint,
+    old: [DVec3; 2],
+    new: [DVec3; 2],
+    direction: DVec3,
+    /// `d' × d`.
+    twist: DVec3,
+}
+
+/// What is needed of the geometry at one quadrature point.
+struct StripPoint {
     s: f64,
     weight: f64,
     y: DVec3,
     ys: DVec3,
     yt: DVec3,
-    direction: DVec3,
-    /// `d' × d`.
-    twist: DVec3,
+    /// The height of the wall, and the jet there.
+    z: f64,
+    jet: Jet,
+}
+
+impl StripRow<'_> {
+    /// The points from the old edge to the new one; the search for the wall goes on from each to the next.
+    fn points<'b>(&'b self, wall: &'b Wall) -> impl Iterator<Item = StripPoint> + 'b {
+        let mut height = 0.0;
+        RULE.iter().map(move |rule| {
+            let s = rule.value[1];
+            let at = |part: usize| (1.0 - s) * self.old[part] + s * self.new[part];
+            let (z, jet) = foot(wall, at(0), self.direction, height);
+            height = z;
+            let weight = rule.weight * self.curve.weight;
+            StripPoint { s, weight, y: at(0), ys: self.new[0] - self.old[0], yt: at(1), z, jet }
+        })
+    }
 }
 
 impl<'a> WallEdge<'a> {
@@ -111,47 +138,38 @@ impl<'a> WallEdge<'a> {
         strip
     }
 
-    fn points(&self) -> impl Iterator<Item = StripPoint<'_>> {
-        CURVES[self.count - 2].iter().flat_map(move |curve| {
+    fn rows(&self) -> impl Iterator<Item = StripRow<'_>> {
+        CURVES[self.count - 2].iter().map(move |curve| {
             let along = |nodes: &[DVec3; 3], by: &[f64; 3]| -> DVec3 {
                 (0..self.count).map(|i| by[i] * nodes[i]).sum()
             };
-            let (old, old_t) = (along(&self.old, &curve.value), along(&self.old, &curve.dt));
-            let (new, new_t) = (along(&self.new, &curve.value), along(&self.new, &curve.dt));
-            let direction = along(&self.directions, &curve.value);
-            let twist = along(&self.directions, &curve.dt).cross(direction);
-            RULE.iter().map(move |rule| {
-                let s = rule.value[1];
-                StripPoint {
-                    curve,
-                    s,
-                    weight: rule.weight * curve.weight,
-                    y: (1.0 - s) * old + s * new,
-                    ys: new - old,
-                    yt: (1.0 - s) * old_t + s * new_t,
-                    direction,
-                    twist,
-                }
-            })
+            let line = |nodes: &[DVec3; 3]| [along(nodes, &curve.value), along(nodes, &curve.dt)];
+            let [direction, turn] = line(&self.directions);
+            let twist = turn.cross(direction);
+            StripRow { curve, old: line(&self.old), new: line(&self.new), direction, twist }
         })
     }
 
     /// The cone over the wall strip, from each of two origins.
     pub(crate) fn value(&self, origins: [DVec3; 2]) -> [f64; 2] {
         let mut values = [0.0; 2];
-        for point in self.points() {
-            let z = height(self.wall, point.y, point.direction, 0.0);
-            let area = point.ys.cross(point.yt);
-            let prism = z * point.direction.dot(area) + 0.5 * z * z * point.ys.dot(point.twist);
-            for (value, origin) in values.iter_mut().zip(origins) {
-                *value += point.weight * ((point.y - origin).dot(area) / 3.0 + prism);
+        if self.new == self.old {
+            return values;
+        }
+        for row in self.rows() {
+            for point in row.points(self.wall) {
+                let (z, area) = (point.z, point.ys.cross(point.yt));
+                let prism = z * row.direction.dot(area) + 0.5 * z * z * point.ys.dot(row.twist);
+                for (value, origin) in values.iter_mut().zip(origins) {
+                    *value += point.weight * ((point.y - origin).dot(area) / 3.0 + prism);
+                }
             }
         }
         values
     }
 
-    /// Adds the gradient and the Hessian of `difference · (strip) − moment · (area vector)`; `local` are the rows of the
-    /// edge's nodes, `base` is where the origin of the loads' frame lies.
+    /// Adds the gradients of `difference · (strip) − moment · (area vector)` at several loads, and the Hessian of the first;
+    /// `local` are the rows of the edge's nodes, `base` is where the origin of the loads' frame lies.
     pub(crate) fn add(
         &self,
         loads: &[StripLoads],
@@ -160,48 +178,70 @@ impl<'a> WallEdge<'a> {
         gradients: &mut [&mut [DVec3]],
         mut hessian: Option<&mut Blocks>,
     ) {
-        for point in self.points() {
-            let p = &point;
-            let z = height(self.wall, p.y, p.direction, 0.0);
-            let foot = p.y + z * p.direction;
-            let jet = self.wall.field.jet(foot);
-            let slope = jet.gradient;
-            let c = slope.dot(p.direction);
-            let zy = -slope / c;
-            let area = p.ys.cross(p.yt);
-            let through = p.direction.dot(area) + z * p.twist.dot(p.ys);
-            for (load, gradient) in loads.iter().zip(gradients.iter_mut()) {
-                let third = load.difference / 3.0;
-                let q = third * (p.y - base) - load.moment + load.difference * z * p.direction;
-                let by_y = third * area + load.difference * through * zy;
-                let by_ys = p.yt.cross(q) + 0.5 * load.difference * z * z * p.twist;
-                let by_yt = q.cross(p.ys);
-                let (by_e, by_f) = (p.s * by_y + by_ys, p.s * by_yt);
-                for (slot, &row) in local.iter().enumerate() {
-                    gradient[row] += p.weight * (p.curve.value[slot] * by_e + p.curve.dt[slot] * by_f);
+        for row in self.rows() {
+            let curve = row.curve;
+            let mut second = Second { ee: DMat3::ZERO, ef: DMat3::ZERO };
+            for point in row.points(self.wall) {
+                for (load, gradient) in loads.iter().zip(gradients.iter_mut()) {
+                    let [by_e, by_f] = row.first(&point, load, base);
+                    for (slot, &row) in local.iter().enumerate() {
+                        gradient[row] += curve.value[slot] * by_e + curve.dt[slot] * by_f;
+                    }
+                }
+                if let (Some(_), Some(load)) = (&hessian, loads.first()) {
+                    second.add(&row, &point, load, base);
                 }
             }
-            let (Some(hessian), Some(load)) = (hessian.as_deref_mut(), loads.first()) else { continue };
-            let third = load.difference / 3.0;
-            let q = third * (p.y - base) - load.moment + load.difference * z * p.direction;
-            let lift = DMat3::IDENTITY + outer(p.direction, zy);
-            let zyy = (-1.0 / c) * (lift.transpose() * jet.hessian * lift);
-            let twisted = p.twist.dot(p.ys);
-            let yy = load.difference * (through * zyy + twisted * outer(zy, zy));
-            let flux = third * DMat3::IDENTITY + load.difference * outer(zy, p.direction);
-            let y_ys = load.difference * z * outer(zy, p.twist) - flux * cross_matrix(p.yt);
-            let y_yt = flux * cross_matrix(p.ys);
-            let ee = p.s * p.s * yy + p.s * (y_ys + y_ys.transpose());
-            let ef = p.s * p.s * y_yt - p.s * cross_matrix(q);
+            let Some(hessian) = hessian.as_deref_mut() else { continue };
             for (j, &column) in local.iter().enumerate() {
-                let (n, d) = (p.weight * p.curve.value[j], p.weight * p.curve.dt[j]);
-                let by_e = n * ee + d * ef;
-                let by_f = n * ef.transpose();
+                let (n, d) = (curve.value[j], curve.dt[j]);
+                let by_e = n * second.ee + d * second.ef;
+                let by_f = n * second.ef.transpose();
                 for (i, &row) in local.iter().enumerate() {
-                    hessian.add(row, column, p.curve.value[i] * by_e + p.curve.dt[i] * by_f);
+                    hessian.add(row, column, curve.value[i] * by_e + curve.dt[i] * by_f);
                 }
             }
         }
+    }
+}
+
+impl StripRow<'_> {
+    /// The weighted derivatives at one point by the new edge's place and tangent there.
+    fn first(&self, p: &StripPoint, load: &StripLoads, base: DVec3) -> [DVec3; 2] {
+        let (z, third) = (p.z, load.difference / 3.0);
+        let zy = -p.jet.gradient / p.jet.gradient.dot(self.direction);
+        let area = p.ys.cross(p.yt);
+        let through = self.direction.dot(area) + z * self.twist.dot(p.ys);
+        let q = third * (p.y - base) - load.moment + load.difference * z * self.direction;
+        let by_y = third * area + load.difference * through * zy;
+        let by_ys = p.yt.cross(q) + 0.5 * load.difference * z * z * self.twist;
+        let by_yt = q.cross(p.ys);
+        [p.weight * (p.s * by_y + by_ys), p.weight * p.s * by_yt]
+    }
+}
+
+/// Second derivatives at one place along the edge, by its place *e* and its tangent *f* there.
+struct Second {
+    ee: DMat3,
+    ef: DMat3,
+}
+
+impl Second {
+    fn add(&mut self, row: &StripRow<'_>, p: &StripPoint, load: &StripLoads, base: DVec3) {
+        let (z, third, direction) = (p.z, load.difference / 3.0, row.direction);
+        let c = p.jet.gradient.dot(direction);
+        let zy = -p.jet.gradient / c;
+        let through = direction.dot(p.ys.cross(p.yt)) + z * row.twist.dot(p.ys);
+        let q = third * (p.y - base) - load.moment + load.difference * z * direction;
+        let lift = DMat3::IDENTITY + outer(direction, zy);
+        let zyy = (-1.0 / c) * (lift.transpose() * p.jet.hessian * lift);
+        let twisted = row.twist.dot(p.ys);
+        let yy = load.difference * (through * zyy + twisted * outer(zy, zy));
+        let flux = third * DMat3::IDENTITY + load.difference * outer(zy, direction);
+        let y_ys = load.difference * z * outer(zy, row.twist) - flux * cross_matrix(p.yt);
+        let y_yt = flux * cross_matrix(p.ys);
+        self.ee += p.weight * (p.s * p.s * yy + p.s * (y_ys + y_ys.transpose()));
+        self.ef += p.weight * (p.s * p.s * y_yt - p.s * cross_matrix(q));
     }
 }
 
@@ -266,7 +306,10 @@ mod tests {
         let wall = Wall { field: Arc::new(Sphere { radius: 2.0 }), level: 0.5 };
         let y = DVec3::new(0.0, 0.3, 2.0);
         let direction = DVec3::new(0.0, 0.1, 1.0);
-        let z = height(&wall, y, direction, 0.0);
+        let (z, jet) = foot(&wall, y, direction, 0.0);
+        let there = wall.field.jet(y + z * direction);
+        // The square of the last step's bound, times the gradient of 1.
+        assert!((jet.gradient - there.gradient).length() < 2e-12);
         assert!(((y + z * direction).length() - 2.5).abs() < 1e-14);
     }
 }
