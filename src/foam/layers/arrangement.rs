@@ -9,7 +9,7 @@ use crate::{
         seeds::{Progress, SeedSettings, sow},
         setup::FoamSpace,
     },
-    surface::{Curvature, Gap, SurfaceSamples},
+    surface::{Curvature, Gap, SurfacePoint, SurfaceSamples},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -52,6 +52,10 @@ pub struct Sheets {
     /// The volume that each cell of the lower and of the upper layer shall have: together the layers fill the gap up to its
     /// middle surface.
     pub volumes: [f64; 2],
+    /// The mean area that a cell of either layer has on its own wall.
+    pub patches: [f64; 2],
+    /// The greatest distance between the walls.
+    pub depth: f64,
 }
 
 impl Sheets {
@@ -138,6 +142,8 @@ fn rows(arrangement: Arrangement, periods: [f64; 2], height: f64, cells: usize) 
         lower: cells,
         spacing: spacing(area, cells),
         volumes: [area * height / as_f64(2 * cells); 2],
+        patches: [area / as_f64(cells); 2],
+        depth: height,
     })
 }
 
@@ -189,6 +195,9 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
         })?;
         places.extend(sown.points);
     }
+    let patches = patches(gap, &middle_samples, cells);
+    let heights = middle_samples.points().iter().map(|point| gap.local_gap(point.position));
+    let depth = heights.fold(0.0, f64::max);
     let moved = |farther: f64| -> Result<Sheets, NoLayers> {
         let seeds = places.iter().enumerate().map(|(at, &place)| {
             let away = farther * distance(gap, place, spacing)?;
@@ -198,7 +207,8 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
             Ok(place + side * away.min(WITHIN / bend) * middle.normal(place))
         });
         let seeds: Vec<DVec3> = seeds.collect::<Result<_, NoLayers>>()?;
-        Ok(Sheets { weights: vec![0.0; seeds.len()], seeds, lower: cells, spacing, volumes: [below, above] })
+        let (weights, volumes) = (vec![0.0; seeds.len()], [below, above]);
+        Ok(Sheets { weights, seeds, lower: cells, spacing, volumes, patches, depth })
     };
     let fits = |sheets: &Sheets| Division::new(gap, &domain, sheets).is_ok();
     for farther in FARTHER {
@@ -208,6 +218,19 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
         }
     }
     settled(gap, &domain, moved(FARTHER[0])?, progress)
+}
+
+/// The mean area of a cell on its own wall: that of the surface at the wall's distance from the middle one (J. Steiner), with the
+/// distance to first order in the gap.
+fn patches(gap: &Gap, middle: &SurfaceSamples, cells: usize) -> [f64; 2] {
+    gap.walls().each_ref().map(|wall| {
+        let area = |point: &SurfacePoint| {
+            let far = wall.level / wall.field.gradient(point.position).length();
+            let Curvature { gauss, mean } = gap.middle().curvature(point.position);
+            point.weight * (1.0 + far * (2.0 * mean + far * gauss)).max(0.0)
+        };
+        middle.points().iter().map(area).sum::<f64>() / as_f64(cells)
+    })
 }
 
 /// Refuses layers that are so flat that films between the layers would reach the walls.

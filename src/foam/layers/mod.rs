@@ -93,11 +93,13 @@ pub enum NoLayers {
     },
     /// Cells reach from wall to wall, or miss their own.
     #[error(
-        "{cells} cells reach the other wall or miss their own: the layers do not fit the height of the gap; widen it or ask for more cells"
+        "of the cells settled between plane films, {reaching} reach the other wall and {missing} miss their own: the layers do not fit the gap; widen it or ask for more cells"
     )]
     Through {
-        /// How many.
-        cells: usize,
+        /// How many reach the other wall.
+        reaching: usize,
+        /// How many miss their own.
+        missing: usize,
     },
     /// The layers are too flat.
     #[error(

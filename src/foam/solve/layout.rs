@@ -4,9 +4,8 @@
 use super::rigid;
 use crate::{
     foam::complex::{Complex, Film, Motion, NodeId, NodeImage, Places, RegionId, RegionKind},
-    index::{Id, IndexVec},
+    index::{Id, IndexVec, checked_u32},
 };
-use faer::sparse::{Argsort, Pair, SymbolicSparseColMat};
 use std::collections::BTreeMap;
 
 /// The nodes and freedoms of a film.
@@ -45,8 +44,6 @@ pub(super) struct Layout {
     pub(super) closed_parts: Vec<Vec<RegionId>>,
     /// All nodes, masters before their slaves.
     pub(super) order_of_motion: Vec<NodeId>,
-    pub(super) pattern: SymbolicSparseColMat<usize>,
-    pub(super) order: Argsort<usize>,
 }
 
 impl Layout {
@@ -92,7 +89,6 @@ impl Layout {
             .iter()
             .map(|film| film_layout(complex, film, &depths, &freedoms, &of_freedom, &of_pressure))
             .collect();
-        let (pattern, order) = pattern(&films, &freedoms, &of_freedom, unknowns);
         Self {
             freedoms,
             of_freedom,
@@ -102,9 +98,20 @@ impl Layout {
             films,
             closed_parts,
             order_of_motion,
-            pattern,
-            order,
         }
+    }
+
+    /// The lower triangle's entries, row and column, in the order in which values are given: each film's, each bounding node's
+    /// own block, the diagonal.
+    pub(super) fn entries(&self) -> Vec<(u32, u32)> {
+        let mut entries = Vec::new();
+        let blocks = self.freedoms.iter().map(|&(first, own)| &self.of_freedom[first..first + own]);
+        for unknowns in self.films.iter().map(|film| &film.unknowns[..]).chain(blocks) {
+            let places = lower_pairs(unknowns).map(|(_, _, row, column)| (checked_u32(row), checked_u32(column)));
+            entries.extend(places);
+        }
+        entries.extend((0..checked_u32(self.unknowns)).map(|at| (at, at)));
+        entries
     }
 }
 
@@ -216,29 +223,6 @@ fn film_layout(
     let mut unknowns: Vec<Option<usize>> = own.iter().map(|&freedom| of_freedom[freedom]).collect();
     unknowns.extend([of_pressure[film.back.region], of_pressure[film.front.region]]);
     FilmLayout { nodes, rows, inner, inner_masters, freedoms: own, unknowns }
-}
-
-/// The lower triangle's entries in the order in which values are given: each film's, each bounding node's own block, the
-/// diagonal.
-fn pattern(
-    films: &[FilmLayout],
-    freedoms: &IndexVec<NodeId, (usize, usize)>,
-    of_freedom: &[Option<usize>],
-    unknowns: usize,
-) -> (SymbolicSparseColMat<usize>, Argsort<usize>) {
-    let mut entries = Vec::new();
-    for film in films {
-        entries.extend(lower_pairs(&film.unknowns).map(|(_, _, row, column)| Pair::new(row, column)));
-    }
-    for &(first, own) in freedoms {
-        let block = &of_freedom[first..first + own];
-        entries.extend(lower_pairs(block).map(|(_, _, row, column)| Pair::new(row, column)));
-    }
-    entries.extend((0..unknowns).map(|at| Pair::new(at, at)));
-    match SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, &entries) {
-        Ok(built) => built,
-        Err(error) => unreachable!("all entries lie inside the matrix: {error:?}"),
-    }
 }
 
 /// All pairs of places in `unknowns` on or below the diagonal of the matrix: the two places, then row and column.

@@ -306,7 +306,7 @@ impl System {
         let films = self.condense(assembled, shift);
         let softening = self.softening(&films);
         let entries = self.entries(&films, walls, shift);
-        let factored = Factored::new(&self.layout, &self.symbolic, entries, &softening).ok();
+        let factored = Factored::new(&self.symbolic, entries, &softening).ok();
         let inner: usize = films.iter().map(|film| film.negative).sum();
         let negative = |found: &Factored<'_>| (found.negative + inner).saturating_sub(self.layout.pressures);
         let extra = factored.as_ref().map_or(1, negative);

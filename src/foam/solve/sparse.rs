@@ -1,17 +1,10 @@
 //! The sparse symmetric system: factored as LDLᵀ, solved with iterative refinement, its inertia read from the signs of D.
 
-use super::layout::Layout;
-use faer::{
-    Conj, MatMut, Par, Side,
-    dyn_stack::{MemBuffer, MemStack},
-    sparse::{
-        SparseColMat,
-        linalg::cholesky::{
-            CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-            factorize_symbolic_cholesky,
-        },
-    },
+use super::{
+    layout::Layout,
+    symmetric::{SymmetricFactor, SymmetricPattern},
 };
+use std::sync::Arc;
 
 /// A failed factorization.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -32,28 +25,20 @@ pub enum FactorError {
 
 /// The fill-reducing order of a pattern: computed once for a topology.
 #[derive(Debug)]
-pub(super) struct Symbolic(SymbolicCholesky<usize>);
+pub(super) struct Symbolic(Arc<SymmetricPattern>);
 
 impl Symbolic {
     pub(super) fn new(layout: &Layout) -> Result<Self, FactorError> {
-        factorize_symbolic_cholesky(
-            layout.pattern.as_ref(),
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map(Self)
-        .map_err(|_| FactorError::Memory { unknowns: layout.unknowns })
+        SymmetricPattern::new(layout.unknowns, layout.entries()).map(|pattern| Self(Arc::new(pattern)))
     }
 }
 
 /// A factored matrix.
 pub(super) struct Factored<'a> {
-    symbolic: &'a Symbolic,
-    matrix: SparseColMat<usize, f64>,
+    /// Of the matrix less `softening`.
+    factor: SymmetricFactor,
     /// What was taken off the diagonal for the factorization alone.
     softening: &'a [f64],
-    values: Vec<f64>,
     /// The number of negative pivots.
     pub(super) negative: usize,
 }
@@ -69,35 +54,17 @@ impl<'a> Factored<'a> {
     /// bounded (the matrix is then quasi-definite: R. J. Vanderbei, SIAM J. Optim. 5 (1995)), and the refinement of each
     /// solution by the true matrix takes it out again.
     pub(super) fn new(
-        layout: &Layout,
-        symbolic: &'a Symbolic,
+        symbolic: &Symbolic,
         mut entries: Vec<f64>,
         softening: &'a [f64],
     ) -> Result<Self, FactorError> {
-        let unknowns = layout.unknowns;
-        let memory = |_| FactorError::Memory { unknowns };
         // The diagonal comes last.
-        let diagonal = entries.len() - unknowns;
+        let diagonal = entries.len() - softening.len();
         entries[diagonal..].iter_mut().zip(softening).for_each(|(entry, off)| *entry -= off);
-        let matrix = SparseColMat::new_from_argsort(layout.pattern.clone(), &layout.order, &entries)
-            .map_err(memory)?;
-        let Symbolic(cholesky) = symbolic;
-        let mut values = vec![0.0; cholesky.len_val()];
-        let scratch = cholesky.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
-        let mut buffer = MemBuffer::try_new(scratch).map_err(|_| FactorError::Memory { unknowns })?;
-        cholesky
-            .factorize_numeric_ldlt(
-                &mut values,
-                matrix.as_ref(),
-                Side::Lower,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut buffer),
-                Default::default(),
-            )
-            .map_err(|_| FactorError::Singular { unknowns })?;
-        let negative = negative_pivots(cholesky, &values);
-        Ok(Self { symbolic, matrix, softening, values, negative })
+        let Symbolic(pattern) = symbolic;
+        let factor = pattern.factor(&entries)?;
+        let negative = factor.negative;
+        Ok(Self { factor, softening, negative })
     }
 
     /// The solution.
@@ -106,22 +73,12 @@ impl<'a> Factored<'a> {
     /// [`FactorError::Singular`] if refinement does not settle.
     pub(super) fn solve(&self, rhs: &[f64]) -> Result<Vec<f64>, FactorError> {
         let unknowns = rhs.len();
-        let Symbolic(cholesky) = self.symbolic;
-        let factor = LdltRef::new(cholesky, &self.values);
-        let scratch = cholesky.solve_in_place_scratch::<f64>(1, Par::Seq);
-        let mut buffer = MemBuffer::try_new(scratch).map_err(|_| FactorError::Memory { unknowns })?;
         let mut solution = vec![0.0; unknowns];
         let mut residual = rhs.to_vec();
         let load = largest(rhs);
         let mut left = f64::INFINITY;
         for _ in 0..=REFINEMENTS {
-            let mut correction = residual.clone();
-            factor.solve_in_place_with_conj(
-                Conj::No,
-                MatMut::from_column_major_slice_mut(&mut correction, unknowns, 1),
-                Par::Seq,
-                MemStack::new(&mut buffer),
-            );
+            let correction = self.factor.correction(&residual)?;
             let candidate: Vec<f64> = solution.iter().zip(&correction).map(|(s, c)| s + c).collect();
             let next = self.residual(rhs, &candidate);
             let size = largest(&next);
@@ -133,39 +90,14 @@ impl<'a> Factored<'a> {
         if left <= SOLVED * load { Ok(solution) } else { Err(FactorError::Singular { unknowns }) }
     }
 
+    /// What is left of `rhs` when the true matrix times `x` is taken away.
     fn residual(&self, rhs: &[f64], x: &[f64]) -> Vec<f64> {
-        let mut residual: Vec<f64> =
-            rhs.iter().zip(self.softening).zip(x).map(|((load, off), x)| load - off * x).collect();
-        for triplet in self.matrix.triplet_iter() {
-            residual[triplet.row] -= triplet.val * x[triplet.col];
-            if triplet.row != triplet.col {
-                residual[triplet.col] -= triplet.val * x[triplet.row];
-            }
-        }
+        let mut residual = self.factor.residual(rhs, x);
+        residual.iter_mut().zip(self.softening).zip(x).for_each(|((left, off), x)| *left -= off * x);
         residual
     }
 }
 
 fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most: f64, value| if value.is_nan() { f64::NAN } else { most.max(value.abs()) })
-}
-
-fn negative_pivots(cholesky: &SymbolicCholesky<usize>, values: &[f64]) -> usize {
-    match cholesky.raw() {
-        SymbolicCholeskyRaw::Simplicial(simplicial) => {
-            // The diagonal comes first in every column.
-            let starts = simplicial.col_ptr();
-            (0..simplicial.nrows()).filter(|&column| values[starts[column]] < 0.0).count()
-        }
-        SymbolicCholeskyRaw::Supernodal(supernodal) => {
-            let factor =
-                faer::sparse::linalg::cholesky::supernodal::SupernodalLdltRef::new(supernodal, values);
-            (0..supernodal.n_supernodes())
-                .map(|node| {
-                    let block = factor.supernode(node).val();
-                    (0..block.ncols()).filter(|&i| block[(i, i)] < 0.0).count()
-                })
-                .sum()
-        }
-    }
 }

@@ -1,7 +1,7 @@
 //! A sparse symmetric, possibly indefinite matrix from any list of entries, factored as LDLᵀ with a fill-reducing order; its
 //! inertia is read from the signs of D.
 //!
-//! For systems that are not made of films; a complex has its own layout (`layout.rs`).
+//! For systems that are not made of films, too; a complex has its own layout (`layout.rs`) and refinement (`sparse.rs`).
 
 use super::{fronts::Fronts, sparse::FactorError, supernodes};
 use crate::index::checked_u32;
@@ -245,7 +245,7 @@ impl SymmetricFactor {
     }
 
     /// The solution to the digits that the factor has.
-    fn correction(&self, residual: &[f64]) -> Result<Vec<f64>, FactorError> {
+    pub(super) fn correction(&self, residual: &[f64]) -> Result<Vec<f64>, FactorError> {
         let size = residual.len();
         let cholesky = &self.pattern.cholesky;
         if let (SymbolicCholeskyRaw::Supernodal(blocks), Some(order)) = (cholesky.raw(), cholesky.perm()) {

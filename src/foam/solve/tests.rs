@@ -93,7 +93,7 @@ fn the_lagrangian_along_a_step_has_the_slope_and_the_bend_that_the_system_says()
     let films = system.condense(&assembled, 0.0);
     let softening = system.softening(&films);
     let entries = system.entries(&films, &system.wall_entries(&at, &assembled), 0.0);
-    let factored = Factored::new(&system.layout, &system.symbolic, entries, &softening).unwrap();
+    let factored = Factored::new(&system.symbolic, entries, &softening).unwrap();
     assert!(films.iter().all(|film| film.negative == 0));
     let (loads, _) = system.loads(&complex, &assembled, &IndexVec::from_elem(0.0, complex.regions.len()));
     let mut rhs = loads.clone();
