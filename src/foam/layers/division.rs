@@ -91,6 +91,13 @@ impl Division {
     /// # Errors
     /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
     pub fn new(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
+        let division = Self::unchecked(gap, domain, sheets)?;
+        division.check(gap)?;
+        Ok(division)
+    }
+
+    /// The same, whether the cells are two layers or not.
+    pub(super) fn unchecked(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
         let sheets = sheets.wrapped(domain);
         let (sight, neighbours) = (Sight::new(gap), Neighbours::new(domain, &sheets));
         let cells: Vec<Vec<Cut>> = (0..sheets.seeds.len())
@@ -120,7 +127,6 @@ impl Division {
             }
         }
         division.corners = joiner.corners;
-        division.check(gap)?;
         Ok(division)
     }
 
@@ -148,7 +154,7 @@ impl Division {
 
     /// The laws of two layers: every cell has its own wall and only that one, and on each wall cells, edges and corners have
     /// Euler's number.
-    fn check(&self, gap: &Gap) -> Result<(), NoLayers> {
+    pub(super) fn check(&self, gap: &Gap) -> Result<(), NoLayers> {
         let mut walls = vec![[false; 2]; self.seeds.len()];
         let mut edges = [0_usize; 2];
         for polygon in &self.polygons {
@@ -159,7 +165,11 @@ impl Division {
             }
         }
         let count = |wrong: &dyn Fn(usize, &[bool; 2]) -> bool| {
-            walls.iter().enumerate().filter(|(cell, walls)| wrong(usize::from(!self.is_lower(*cell)), walls)).count()
+            walls
+                .iter()
+                .enumerate()
+                .filter(|(cell, walls)| wrong(usize::from(!self.is_lower(*cell)), walls))
+                .count()
         };
         let reaching = count(&|own, walls| walls[1 - own]);
         let missing = count(&|own, walls| !walls[own]);

@@ -351,13 +351,7 @@ impl Run<'_> {
         coarser
     }
 
-    fn end(
-        self,
-        descent: &Descent,
-        descended: Descended,
-        first_energy: f64,
-        leaving: Vec<usize>,
-    ) -> Layers {
+    fn end(self, descent: &Descent, descended: Descended, first_energy: f64, leaving: Vec<usize>) -> Layers {
         let vanishing = if descended.ending == Ending::Converged {
             Vec::new()
         } else {

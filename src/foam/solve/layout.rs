@@ -89,16 +89,7 @@ impl Layout {
             .iter()
             .map(|film| film_layout(complex, film, &depths, &freedoms, &of_freedom, &of_pressure))
             .collect();
-        Self {
-            freedoms,
-            of_freedom,
-            of_pressure,
-            unknowns,
-            pressures,
-            films,
-            closed_parts,
-            order_of_motion,
-        }
+        Self { freedoms, of_freedom, of_pressure, unknowns, pressures, films, closed_parts, order_of_motion }
     }
 
     /// The lower triangle's entries, row and column, in the order in which values are given: each film's, each bounding node's
@@ -107,7 +98,8 @@ impl Layout {
         let mut entries = Vec::new();
         let blocks = self.freedoms.iter().map(|&(first, own)| &self.of_freedom[first..first + own]);
         for unknowns in self.films.iter().map(|film| &film.unknowns[..]).chain(blocks) {
-            let places = lower_pairs(unknowns).map(|(_, _, row, column)| (checked_u32(row), checked_u32(column)));
+            let places =
+                lower_pairs(unknowns).map(|(_, _, row, column)| (checked_u32(row), checked_u32(column)));
             entries.extend(places);
         }
         entries.extend((0..checked_u32(self.unknowns)).map(|at| (at, at)));
