@@ -190,5 +190,36 @@ fn layers_that_do_not_fit_are_refused() {
         panic!("flat layers are refused");
     };
     assert!((0.1..0.5).contains(&flattest) && needed > 64.0, "{flattest} {needed}");
-    assert!(matches!(sown(space(), Arrangement::Annealed, 4000), Err(NoLayers::Many { .. })));
+    assert!(matches!(sown(space(), Arrangement::Annealed, 6000), Err(NoLayers::Many { .. })));
+    // A sphere's pattern has cells of five sides: too deep ones are refused before anything is settled.
+    let deep = FoamSpace::Sphere { radii: [1.0, 2.0] };
+    let Err(NoLayers::Deep { deepest, fitting }) = sown(deep, Arrangement::Annealed, 400) else {
+        panic!("deep layers are refused");
+    };
+    assert!(deepest > 2.5 && (50.0..200.0).contains(&fitting), "{deepest} {fitting}");
+}
+
+#[test]
+fn an_arrangement_with_a_name_ends_where_its_borders_vanish() -> Result<(), NoLayers> {
+    // On a small block of bees' ends that is stretched by a thousandth, corners of eight borders part into borders that shrink.
+    let space = FoamSpace::Plane { periods: [8.0, 9.24], height: HEIGHT };
+    let layers = made(&space, Arrangement::Rhombic, 64, 1)?;
+    assert_eq!((layers.descended.ending, layers.flips), (Ending::Halted, 0), "{:?}", layers.descended);
+    assert!(!layers.vanishing.is_empty() && layers.leaving.is_empty());
+    assert!(layers.descended.residuals.force > 1e-10);
+    for figures in layer_figures(&layers.division) {
+        assert_eq!(figures.side_counts[6], 64, "the arrangement stays what it is");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_foam_ends_where_a_cell_is_squeezed_off_its_wall() -> Result<(), NoLayers> {
+    let layers = made(&FoamSpace::Sphere { radii: [1.0, 2.8] }, Arrangement::Annealed, 40, 1)?;
+    assert_eq!(layers.descended.ending, Ending::Halted, "{:?}", layers.descended);
+    // Cells between spheres are narrowest at the inner one.
+    assert!(!layers.leaving.is_empty() && layers.leaving.iter().all(|&cell| layers.division.is_lower(cell)));
+    let sides = &layer_figures(&layers.division)[0].sides;
+    assert!(layers.leaving.iter().all(|&cell| sides[cell] < 6));
+    Ok(())
 }

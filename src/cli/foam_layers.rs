@@ -2,7 +2,7 @@
 
 use super::{
     CliError,
-    foam_run::{Line, by_sides, finished},
+    foam_run::{Line, by_sides, finished, watched},
     foam_settings::FoamSettings,
     interrupt, progress,
 };
@@ -44,10 +44,12 @@ impl From<PatternName> for Arrangement {
 }
 
 /// The name and version of `summary.json`.
-const SCHEMA: &str = "combwright.layers-summary/2";
+const SCHEMA: &str = "combwright.layers-summary/3";
 
 /// Steps of the progress bar.
 const BAR: u64 = 1000;
+/// What a foam takes on two cores, by the cells on each wall: settling and Newton steps grow in proportion.
+const SECONDS_PER_CELL: f64 = 0.4;
 
 /// The figures of a two-layer foam.
 #[derive(Serialize)]
@@ -69,6 +71,8 @@ struct Summary<'a> {
     /// Changes of topology on the way.
     flips: usize,
     vanishing_borders: usize,
+    /// Cells that were squeezed off their own wall.
+    cells_off_their_wall: usize,
     volume_spread: f64,
     corner_angle_mean_deg: f64,
     corner_angle_worst_deg: f64,
@@ -87,17 +91,21 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     let (arrangement, cells) = (Arrangement::from(pattern), settings.seeds.count);
     interrupt::listen();
     let bar = progress::steps(BAR);
-    bar.set_message("seeds of both layers");
-    let sheets =
-        sheets(&settings.space, &gap, arrangement, cells, settings.seeds.seed, &mut |_| interrupt::flow());
+    let minutes = (as_f64(cells) * SECONDS_PER_CELL / 60.0).ceil();
+    let stage = format!("layers settle; all takes about {minutes} min");
+    let sheets = sheets(&settings.space, &gap, arrangement, cells, settings.seeds.seed, &mut |share| {
+        watched(&bar, &stage, share)
+    });
     let sheets = sheets.map_err(failed)?;
     let division = Division::new(&gap, &domain, &sheets).map_err(failed)?;
     // The same number of elements on each half side; the default is the coarsest.
     let fineness = if fine { settings.relax.strips.along } else { 1 };
     let tolerance = settings.relax.tolerance.max(1e-10);
     let how = LayerSettings { fineness, tolerance, ..LayerSettings::new(arrangement, sheets.spacing) };
+    let mut steps = 0;
     let layers = relaxed(division, &gap, &how, &mut |told| {
-        bar.set_message(format!("force {:.1e}", told.residuals.force));
+        steps += 1;
+        bar.set_message(format!("Newton step {steps}, force {:.1e}", told.residuals.force));
         interrupt::flow()
     });
     let layers = layers.map_err(failed)?;
@@ -135,6 +143,7 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         unstable: layers.descended.unstable,
         flips: layers.flips,
         vanishing_borders: layers.vanishing.len(),
+        cells_off_their_wall: layers.leaving.len(),
         volume_spread: layers.volume_spread(),
         corner_angle_mean_deg: angles[0],
         corner_angle_worst_deg: angles[1],
@@ -154,6 +163,10 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     finished(folder, lines)
 }
 
+fn as_f64(count: usize) -> f64 {
+    f64::from(crate::index::checked_u32(count))
+}
+
 fn failed(error: NoLayers) -> CliError {
     match error {
         NoLayers::Sown(SeedError::Interrupted { .. }) | NoLayers::Factor(_) | NoLayers::Lost { .. } => {
@@ -168,8 +181,7 @@ fn angles(layers: &Layers) -> [f64; 2] {
     let angles = corner_angles(layers);
     let off = |angle: &f64| (angle - tetrahedral_angle()).to_degrees();
     let worst = angles.iter().map(|angle| off(angle).abs()).fold(0.0, f64::max);
-    let count = f64::from(crate::index::checked_u32(angles.len().max(1)));
-    [angles.iter().map(off).sum::<f64>() / count, worst]
+    [angles.iter().map(off).sum::<f64>() / as_f64(angles.len().max(1)), worst]
 }
 
 fn ended(layers: &Layers) -> String {
@@ -181,11 +193,21 @@ fn ended(layers: &Layers) -> String {
             format!("step limit of {} reached, {vanishing} borders vanishing", descended.steps)
         }
         Ending::Stalled => format!("stalled after {} steps, {vanishing} borders vanishing", descended.steps),
+        Ending::Halted if !layers.leaving.is_empty() => format!(
+            "stopped after {} steps: the pressure in {} squeezes {} off its wall, so that there is no foam nearby with all cells on their walls; cells less deep keep them (fewer cells, or a narrower gap)",
+            descended.steps,
+            cells_of(layers.leaving.len()),
+            if layers.leaving.len() == 1 { "it" } else { "each" },
+        ),
         Ending::Halted => format!(
             "stopped after {} steps: {vanishing} borders vanish, where the foam would change its topology",
             descended.steps
         ),
     }
+}
+
+fn cells_of(count: usize) -> String {
+    if count == 1 { "a cell".to_owned() } else { format!("{count} cells") }
 }
 
 fn table(summary: &Summary<'_>, layers: &Layers) -> Vec<Line> {

@@ -131,14 +131,15 @@ pub(super) fn started(settings: &FoamSettings, gap: &Gap, bar: &ProgressBar) -> 
         .map_err(seeds_failed)
 }
 
-fn watched(bar: &ProgressBar, stage: &'static str, share: f64) -> ControlFlow<()> {
+/// Shows how far a stage has come and asks whether it shall go on.
+pub(super) fn watched(bar: &ProgressBar, stage: &str, share: f64) -> ControlFlow<()> {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a share of the bar's length"
     )]
     bar.set_position((share * 1000.0) as u64);
-    bar.set_message(stage);
+    bar.set_message(stage.to_owned());
     interrupt::flow()
 }
 

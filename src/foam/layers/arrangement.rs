@@ -1,6 +1,6 @@
 //! Two sheets of seeds.
 
-use super::{Division, NoLayers, plane_end, settle::settled, spacing};
+use super::{Division, NoLayers, layer_figures, plane_end, settle::settled, spacing};
 use crate::{
     foam::{
         convert::as_f64,
@@ -9,7 +9,7 @@ use crate::{
         seeds::{Progress, SeedSettings, sow},
         setup::FoamSpace,
     },
-    surface::{Curvature, Gap, SurfaceSamples},
+    surface::{Curvature, Gap, SurfacePoint, SurfaceSamples, Wall},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -52,6 +52,10 @@ pub struct Sheets {
     /// The volume that each cell of the lower and of the upper layer shall have: together the layers fill the gap up to its
     /// middle surface.
     pub volumes: [f64; 2],
+    /// The mean area that a cell of either layer has on its own wall.
+    pub patches: [f64; 2],
+    /// The greatest distance between the walls.
+    pub depth: f64,
 }
 
 impl Sheets {
@@ -138,6 +142,8 @@ fn rows(arrangement: Arrangement, periods: [f64; 2], height: f64, cells: usize) 
         lower: cells,
         spacing: spacing(area, cells),
         volumes: [area * height / as_f64(2 * cells); 2],
+        patches: [area / as_f64(cells); 2],
+        depth: height,
     })
 }
 
@@ -159,8 +165,19 @@ const WITHIN: f64 = 0.8;
 const FLATTEST: f64 = 0.5;
 /// The height, in spacings, from which on layers keep apart on all surfaces that were tried.
 const COMFORTABLE: f64 = 0.7;
-/// The most cells on each wall: a step for 64 takes 2 s of one core, and the work grows with the power 3/2 of the cells.
-const MOST_CELLS: usize = 1000;
+/// Cells of five sides or fewer that are deeper than this many of their widths at their wall are refused. Between planes those of
+/// 64 cells a wall stay on their walls at 1.5 widths and leave them at 1.9, between spheres (radii 1 and 2) they stay at
+/// 1.5 and leave at 2.1; with the 12 of 24 cells between the radii 1 and 4, which brace each other, all stay at 1.9.
+const DEEPEST: f64 = 2.5;
+/// Patterns of so many cells, annealed, have some of five sides.
+const MANY: usize = 100;
+/// The depth, in widths, up to which cells stayed on their walls on all surfaces that were tried.
+const SHALLOW: f64 = 1.5;
+/// The most cells on each wall.
+const MOST_CELLS: usize = 5000;
+
+/// The share of the time that sowing takes before the layers settle.
+const SOWING: f64 = 0.1;
 
 /// How much farther seeds are put where the cells of the nearest ones reach the other wall.
 const FARTHER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
@@ -181,14 +198,18 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
     }
     let [below, above] = gap.halves().map(|half| gap_volume(&half, &domain) / as_f64(cells));
     refuse_flat(gap, &middle_samples, [below, above], cells)?;
+    refuse_deep_everywhere(gap, &middle_samples, [below, above], cells)?;
     let settings = SeedSettings::new(cells, seed);
     let mut places = Vec::with_capacity(2 * cells);
     for layer in 0..2 {
         let sown = sow(gap, &domain, &settings, layer, &mut |share| {
-            progress(0.5 * (share + if layer == 0 { 0.0 } else { 1.0 }))
+            progress(SOWING * 0.5 * (share + if layer == 0 { 0.0 } else { 1.0 }))
         })?;
         places.extend(sown.points);
     }
+    let patches = patches(gap, &middle_samples, cells);
+    let heights = middle_samples.points().iter().map(|point| gap.local_gap(point.position));
+    let depth = heights.fold(0.0, f64::max);
     let moved = |farther: f64| -> Result<Sheets, NoLayers> {
         let seeds = places.iter().enumerate().map(|(at, &place)| {
             let away = farther * distance(gap, place, spacing)?;
@@ -198,24 +219,95 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
             Ok(place + side * away.min(WITHIN / bend) * middle.normal(place))
         });
         let seeds: Vec<DVec3> = seeds.collect::<Result<_, NoLayers>>()?;
-        Ok(Sheets { weights: vec![0.0; seeds.len()], seeds, lower: cells, spacing, volumes: [below, above] })
+        let (weights, volumes) = (vec![0.0; seeds.len()], [below, above]);
+        Ok(Sheets { weights, seeds, lower: cells, spacing, volumes, patches, depth })
     };
-    let fits = |sheets: &Sheets| Division::new(gap, &domain, sheets).is_ok();
+    let settling = &mut |done| progress(SOWING + (1.0 - SOWING) * done);
+    let mut first = None;
     for farther in FARTHER {
         let sheets = moved(farther)?;
-        if fits(&sheets) {
-            return settled(gap, &domain, sheets, progress);
+        let division = Division::unchecked(gap, &domain, &sheets)?;
+        if first.is_none() {
+            refuse_deep(gap, &division, &places)?;
+        }
+        if division.check(gap).is_ok() {
+            return settled(gap, &domain, sheets, settling);
+        }
+        first.get_or_insert(sheets);
+    }
+    settled(gap, &domain, first.map_or_else(|| moved(FARTHER[0]), Ok)?, settling)
+}
+
+/// Refuses layers in which cells of few sides are so deep that they leave their walls. `places` are those of the seeds on the
+/// middle surface.
+fn refuse_deep(gap: &Gap, division: &Division, places: &[DVec3]) -> Result<(), NoLayers> {
+    let figures = layer_figures(division);
+    let sides = figures.iter().flat_map(|layer| &layer.sides);
+    let few = sides.zip(places).enumerate().filter(|(_, (sides, _))| **sides < 6);
+    let deepest = few
+        .map(|(cell, (_, &place))| {
+            let layer = usize::from(!division.is_lower(cell));
+            slenderness(gap, &gap.walls()[layer], division.volumes[layer], place)
+        })
+        .fold(0.0, f64::max);
+    if deepest > DEEPEST { Err(too_deep(deepest, division.lower)) } else { Ok(()) }
+}
+
+/// The same before seeds are sown, of so many cells that some have five sides, where the layers are that deep everywhere.
+fn refuse_deep_everywhere(
+    gap: &Gap,
+    middle: &SurfaceSamples,
+    volumes: [f64; 2],
+    cells: usize,
+) -> Result<(), NoLayers> {
+    for (wall, volume) in gap.walls().iter().zip(volumes) {
+        let depths = middle.points().iter().map(|point| slenderness(gap, wall, volume, point.position));
+        let (least, most) =
+            depths.fold((f64::INFINITY, 0.0_f64), |(low, high), depth| (low.min(depth), high.max(depth)));
+        if cells >= MANY && least > DEEPEST {
+            return Err(too_deep(most, cells));
         }
     }
-    settled(gap, &domain, moved(FARTHER[0])?, progress)
+    Ok(())
+}
+
+fn too_deep(deepest: f64, cells: usize) -> NoLayers {
+    NoLayers::Deep { deepest, fitting: (SHALLOW / deepest).powi(2) * as_f64(cells) }
+}
+
+/// The depth of a cell over its width at its wall.
+fn slenderness(gap: &Gap, wall: &Wall, volume: f64, place: DVec3) -> f64 {
+    let height = height(wall, place);
+    // The least area that Steiner's formula may give is one where normals almost meet.
+    let area = volume / height * steiner(gap, wall, place).max(0.01);
+    height / (2.0 / 3.0_f64.sqrt() * area).sqrt()
+}
+
+/// The distance of a wall from the middle surface, to first order in the gap.
+fn height(wall: &Wall, place: DVec3) -> f64 {
+    wall.level.abs() / wall.field.gradient(place).length()
+}
+
+/// The area of a wall over that of the middle surface below it (J. Steiner).
+fn steiner(gap: &Gap, wall: &Wall, place: DVec3) -> f64 {
+    let far = height(wall, place).copysign(wall.level);
+    let Curvature { gauss, mean } = gap.middle().curvature(place);
+    (1.0 + far * (2.0 * mean + far * gauss)).max(0.0)
+}
+
+/// The mean area of a cell on its own wall.
+fn patches(gap: &Gap, middle: &SurfaceSamples, cells: usize) -> [f64; 2] {
+    gap.walls().each_ref().map(|wall| {
+        let area = |point: &SurfacePoint| point.weight * steiner(gap, wall, point.position);
+        middle.points().iter().map(area).sum::<f64>() / as_f64(cells)
+    })
 }
 
 /// Refuses layers that are so flat that films between the layers would reach the walls.
 fn refuse_flat(gap: &Gap, middle: &SurfaceSamples, volumes: [f64; 2], cells: usize) -> Result<(), NoLayers> {
     for (wall, volume) in gap.walls().iter().zip(volumes) {
         // A cell's height, to first order in the gap, over the spacing of neighbours of its volume.
-        let height = |place: DVec3| wall.level.abs() / wall.field.gradient(place).length();
-        let flat = |place: DVec3| height(place).powi(3).sqrt() / (volume * 2.0 / 3.0_f64.sqrt()).sqrt();
+        let flat = |place: DVec3| height(wall, place).powi(3).sqrt() / (volume * 2.0 / 3.0_f64.sqrt()).sqrt();
         let flattest = middle.points().iter().map(|point| flat(point.position)).fold(f64::INFINITY, f64::min);
         if flattest < FLATTEST {
             // The spacing falls with the root of the number of cells.

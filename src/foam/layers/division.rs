@@ -18,7 +18,7 @@ use crate::{
 };
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A corner: an end of borders.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,8 +70,9 @@ pub struct Division {
 
 /// Neighbours are sought within this many spacings of a seed.
 const REACH: f64 = 5.0;
-/// The cube that cells are cut from, in spacings.
+/// Half the cube that cells are cut from, in spacings and in distances between the walls: it reaches beyond both walls.
 const CUBE: f64 = 4.0;
+const CUBE_OF_DEPTH: f64 = 1.2;
 /// Corners nearer to each other than this part of the spacing are one: those of rows, where more than four cells meet, come out
 /// equal to 1e-11 from each cell. Far above that, a corner that lies near a wall by chance would be joined with where its own
 /// borders meet the wall, to a corner of five bodies that no change of topology can part.
@@ -90,6 +91,13 @@ impl Division {
     /// # Errors
     /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
     pub fn new(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
+        let division = Self::unchecked(gap, domain, sheets)?;
+        division.check(gap)?;
+        Ok(division)
+    }
+
+    /// The same, whether the cells are two layers or not.
+    pub(super) fn unchecked(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
         let sheets = sheets.wrapped(domain);
         let (sight, neighbours) = (Sight::new(gap), Neighbours::new(domain, &sheets));
         let cells: Vec<Vec<Cut>> = (0..sheets.seeds.len())
@@ -119,7 +127,6 @@ impl Division {
             }
         }
         division.corners = joiner.corners;
-        division.check(gap)?;
         Ok(division)
     }
 
@@ -147,7 +154,7 @@ impl Division {
 
     /// The laws of two layers: every cell has its own wall and only that one, and on each wall cells, edges and corners have
     /// Euler's number.
-    fn check(&self, gap: &Gap) -> Result<(), NoLayers> {
+    pub(super) fn check(&self, gap: &Gap) -> Result<(), NoLayers> {
         let mut walls = vec![[false; 2]; self.seeds.len()];
         let mut edges = [0_usize; 2];
         for polygon in &self.polygons {
@@ -157,13 +164,17 @@ impl Division {
                 walls[polygon.neighbour][wall as usize] = true;
             }
         }
-        let through = walls.iter().enumerate().filter(|(cell, walls)| {
-            let own = usize::from(!self.is_lower(*cell));
-            !walls[own] || walls[1 - own]
-        });
-        let wrong = through.count();
-        if wrong > 0 {
-            return Err(NoLayers::Through { cells: wrong });
+        let count = |wrong: &dyn Fn(usize, &[bool; 2]) -> bool| {
+            walls
+                .iter()
+                .enumerate()
+                .filter(|(cell, walls)| wrong(usize::from(!self.is_lower(*cell)), walls))
+                .count()
+        };
+        let reaching = count(&|own, walls| walls[1 - own]);
+        let missing = count(&|own, walls| !walls[own]);
+        if reaching + missing > 0 {
+            return Err(NoLayers::Through { reaching, missing });
         }
         let euler = i64::from(gap.middle().euler_characteristic());
         for side in WallSide::BOTH {
@@ -219,7 +230,8 @@ pub(super) struct Body {
 }
 
 impl Neighbours {
-    /// Of seeds inside the primary box, the nearest first.
+    /// Of seeds inside the primary box: those that bound the cell first, so that hardly any other cuts anything away, then the
+    /// nearest first.
     pub(super) fn new(domain: &Domain, sheets: &Sheets) -> Self {
         let Sheets { seeds, spacing, .. } = sheets;
         let bins = Bins::new(domain, *spacing, seeds);
@@ -234,7 +246,24 @@ impl Neighbours {
             near.sort_by(|a, b| a.0.total_cmp(&b.0).then(key(a).cmp(&key(b))));
             near.into_iter().map(|(_, other, shift)| (other, shift)).collect()
         });
-        Self { near: near.collect(), period: domain.period() }
+        let mut neighbours = Self { near: near.collect(), period: domain.period() };
+        let bounding = |cell| {
+            let body = neighbours.body(sheets, cell).ok()?;
+            let behind = body.polyhedron.faces.iter().filter_map(|face| match face.half_space.behind {
+                Behind::Cell(at) => Some(at as usize),
+                _ => None,
+            });
+            Some(behind.collect::<BTreeSet<usize>>())
+        };
+        let bounding: Vec<_> = (0..sheets.seeds.len()).into_par_iter().map(bounding).collect();
+        for (near, bounding) in neighbours.near.iter_mut().zip(bounding) {
+            let bounding = bounding.unwrap_or_default();
+            let (mut first, rest): (Vec<_>, Vec<_>) =
+                near.drain(..).enumerate().partition(|(at, _)| bounding.contains(at));
+            first.extend(rest);
+            near.extend(first.into_iter().map(|(_, seed)| seed));
+        }
+        neighbours
     }
 
     /// The cell of a seed; the seeds may have moved since the neighbours were listed.
@@ -248,7 +277,7 @@ impl Neighbours {
             Near { cell: other, shift, way }
         });
         let near: Vec<Near> = near.collect();
-        let mut polyhedron = Polyhedron::cube(CUBE * spacing);
+        let mut polyhedron = Polyhedron::cube((CUBE * spacing).max(CUBE_OF_DEPTH * sheets.depth));
         for (at, Near { cell: other, way, .. }) in near.iter().enumerate() {
             let distance = way.length();
             let square = way.length_squared() + own - sheets.weights[*other];

@@ -25,6 +25,14 @@ use std::{collections::BTreeMap, ops::Range};
 /// A border or an edge on a wall: its two corners, the second in the frame of the first.
 pub type Side = (usize, usize, [i32; 3]);
 
+/// The side between two corners of a polygon, and whether it goes from the first to the second.
+pub(super) fn side_between(from: CornerImage, to: CornerImage) -> (Side, bool) {
+    let forward = (from.corner, from.shift) <= (to.corner, to.shift);
+    let (a, b) = if forward { (from, to) } else { (to, from) };
+    let shift = IVec3::from_array(b.shift) - IVec3::from_array(a.shift);
+    ((a.corner, b.corner, shift.to_array()), forward)
+}
+
 /// The films of two layers.
 #[derive(Clone, Debug)]
 pub struct LayerFilms {
@@ -168,15 +176,12 @@ impl<'a> Builder<'a> {
 
     /// The nodes along a side of a polygon, both ends included, in the polygon's frame.
     fn side(&mut self, from: CornerImage, to: CornerImage, wall: Option<WallSide>) -> Vec<NodeImage> {
-        let forward = (from.corner, from.shift) <= (to.corner, to.shift);
-        let (a, b) = if forward { (from, to) } else { (to, from) };
-        let relative = IVec3::from_array(b.shift) - IVec3::from_array(a.shift);
-        let key = (a.corner, b.corner, relative.to_array());
+        let (key, forward) = side_between(from, to);
         if !self.sides.contains_key(&key) {
-            let made = self.new_side(key, relative, wall);
+            let made = self.new_side(key, IVec3::from_array(key.2), wall);
             self.sides.insert(key, made);
         }
-        let shift = IVec3::from_array(a.shift);
+        let shift = IVec3::from_array(if forward { from.shift } else { to.shift });
         let mut nodes: Vec<NodeImage> = self.sides[&key]
             .nodes
             .iter()

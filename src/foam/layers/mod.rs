@@ -18,7 +18,11 @@
 //!
 //! Each layer fills its side of the gap up to the middle surface, in equal cells. Annealed layers that are less high than half
 //! a cell's width are refused: there films between the layers reach the walls, and the foam of least energy is no foam of two
-//! layers.
+//! layers. Deep ones have a limit, too: the pressure in a cell of five sides or fewer squeezes its cross section the more the
+//! smaller that is, and only the slope of its sides holds against it, as surface tension fails to hold a long jet together
+//! (J. Plateau; Lord Rayleigh, 1878). Between planes cells of five sides stay on their walls at 1.5 widths of depth and are squeezed
+//! off at 1.9. Annealed patterns with such cells that are far deeper are refused before they are settled; nearer to the limit
+//! the foam ends where a cell leaves its wall, and says so.
 //!
 //! Not promised: balance. A change that would take a cell to the other wall, away from its own, or to a second film with a
 //! neighbour is not made, nor one at corners where more than four cells meet, as in the bees' arrangement; a foam that needs it
@@ -93,11 +97,13 @@ pub enum NoLayers {
     },
     /// Cells reach from wall to wall, or miss their own.
     #[error(
-        "{cells} cells reach the other wall or miss their own: the layers do not fit the height of the gap; widen it or ask for more cells"
+        "of the cells settled between plane films, {reaching} reach the other wall and {missing} miss their own: the layers do not fit the gap; widen it or ask for more cells"
     )]
     Through {
-        /// How many.
-        cells: usize,
+        /// How many reach the other wall.
+        reaching: usize,
+        /// How many miss their own.
+        missing: usize,
     },
     /// The layers are too flat.
     #[error(
@@ -109,9 +115,19 @@ pub enum NoLayers {
         /// Cells on each wall that would do.
         needed: f64,
     },
+    /// Cells of few sides are too deep.
+    #[error(
+        "the layers are too deep: cells of five sides or fewer would be up to {deepest:.1} times as deep as they are wide at their wall, and from about 1.7 times on their pressure squeezes such cells off it; ask for {fitting:.0} cells on each wall or fewer, or for a narrower gap"
+    )]
+    Deep {
+        /// The greatest depth of a cell over its width.
+        deepest: f64,
+        /// Cells on each wall that would do.
+        fitting: f64,
+    },
     /// More cells than can be relaxed.
     #[error(
-        "{cells} cells on each wall are too many: Newton's matrix for two layers takes minutes a step from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
+        "{cells} cells on each wall are too many: Newton's matrix for two layers takes minutes a step and more than ten gigabytes from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
     )]
     Many {
         /// Asked for.

@@ -5,9 +5,9 @@
 //! the descent then tells which of them grow, and which shrink again and change the topology. Pushes are those of
 //! position-based dynamics (M. Müller et al., J. Vis. Commun. Image R. 18 (2007)).
 
-use super::{Division, Side, division::CornerImage};
+use super::{Division, Side, division::CornerImage, films::side_between};
 use crate::surface::Gap;
-use glam::{DVec3, IVec3};
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// The height of a triangle, as a part of the least length of sides.
@@ -82,10 +82,7 @@ pub(super) fn sides(division: &Division) -> BTreeMap<Side, usize> {
     for polygon in &division.polygons {
         for (at, &to) in polygon.corners.iter().enumerate() {
             let from = polygon.corners[(at + polygon.corners.len() - 1) % polygon.corners.len()];
-            let (a, b) =
-                if (from.corner, from.shift) <= (to.corner, to.shift) { (from, to) } else { (to, from) };
-            let shift = IVec3::from_array(b.shift) - IVec3::from_array(a.shift);
-            *sides.entry((a.corner, b.corner, shift.to_array())).or_insert(0) += 1;
+            *sides.entry(side_between(from, to).0).or_insert(0) += 1;
         }
     }
     sides

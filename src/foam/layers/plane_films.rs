@@ -16,9 +16,13 @@ use crate::{
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// The stiffness against unequal volumes, in tension × spacing² for a cell of twice its volume: cells of a foam differ in
+/// The stiffness against unequal volumes, in tensions over a spacing for a cell of twice its volume: cells of a foam differ in
 /// pressure by less than a tension over their size, so that volumes come out equal to some percent.
-const STIFFNESS: f64 = 10.0;
+const STIFFNESS: f64 = 14.0;
+/// A cell's patch on its own wall below this part of the mean is stretched, and how stiffly, in tension × spacing²: power cells,
+/// which have plane sides through their whole height, would leave the wall to their neighbours where curved films keep it.
+const SMALL_PATCH: f64 = 0.4;
+const HOLD: f64 = 5.0;
 
 /// The tension of a wall of the other layer: more than films cost, so that cells withdraw from it.
 const WETTING: f64 = 2.0;
@@ -167,22 +171,26 @@ impl<'a> Bounded<'a> {
             area += 0.5 * add_area(&loop_of, 0.5, &mut by_area[film]);
             volume += add_cone(&loop_of, &mut by_volume[film]);
         }
-        let foreign = if cell < sheets.lower { WallSide::Upper } else { WallSide::Lower };
+        let layer = usize::from(cell >= sheets.lower);
+        let foreign = if layer == 0 { WallSide::Upper } else { WallSide::Lower };
         for wall in WallSide::BOTH {
             volume += self.add_patch_cone(wall, &mut by_volume);
-            if wall == foreign {
-                area += WETTING * self.add_patch_area(wall, WETTING, &mut by_area);
-            }
+            area += if wall == foreign {
+                WETTING * self.add_patch_area(wall, WETTING, &mut by_area)
+            } else {
+                let least = SMALL_PATCH * sheets.patches[layer];
+                spacing * spacing * self.add_hold(wall, least, spacing * spacing, &mut by_area)
+            };
         }
         let (area, volume) = (area / (spacing * spacing), volume / spacing.powi(3) + bulges[cell]);
-        let wanted = sheets.volumes[usize::from(cell >= sheets.lower)] / spacing.powi(3);
+        let wanted = sheets.volumes[layer] / spacing.powi(3);
         let off = volume / wanted - 1.0;
-        let pull = STIFFNESS * off / wanted / spacing;
+        let pull = STIFFNESS * off / spacing;
         for (area, volume) in by_area.iter_mut().flatten().zip(by_volume.iter().flatten()) {
             *area += pull * *volume;
         }
         let gradient = self.passed_on(gap, cell, &by_area, spacing);
-        Share { energy: area + 0.5 * STIFFNESS * off * off, gradient }
+        Share { energy: area + 0.5 * STIFFNESS * wanted * off * off, gradient }
     }
 
     /// The cone from the seed over the chords on a wall and their mean.
@@ -194,6 +202,17 @@ impl<'a> Bounded<'a> {
             by_volume[film][b] += middle.cross(places[0]) / 6.0;
         }
         middle.dot(twice) / 6.0
+    }
+
+    /// What it costs, in tension × spacing², that a patch is smaller than `least`.
+    fn add_hold(&self, wall: WallSide, least: f64, unit: f64, by_area: &mut Forces) -> f64 {
+        let area = self.patch(wall).map_or(0.0, |(_, twice, _)| 0.5 * twice.length());
+        let short = 1.0 - area / least;
+        if short <= 0.0 {
+            return 0.0;
+        }
+        self.add_patch_area(wall, -HOLD * short * unit / least, by_area);
+        0.5 * HOLD * short * short
     }
 
     fn add_patch_area(&self, wall: WallSide, factor: f64, by_area: &mut Forces) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::{
     Arrangement, Division, LayerFilms, NoLayers,
-    films::{Side, films_after, films_refined},
+    films::{Side, films_after, films_refined, side_between},
     flip::{Cluster, Moves},
     layer_films,
     open::open,
@@ -30,7 +30,8 @@ pub struct Layers {
     pub division: Division,
     /// The films where they ended.
     pub films: LayerFilms,
-    /// The energy of the first, plane films.
+    /// The energy of the plane films that the descent started from: of power cells, with slivers opened where topology may
+    /// change.
     pub first_energy: f64,
     /// The energy at the end.
     pub energy: f64,
@@ -44,6 +45,8 @@ pub struct Layers {
     pub flips: usize,
     /// Borders that are shorter than a twentieth of the spacing although the descent has not converged, and their lengths.
     pub vanishing: Vec<(Side, f64)>,
+    /// Cells that were squeezed off their own wall, where the descent ended: there is no foam nearby in which all keep theirs.
+    pub leaving: Vec<usize>,
 }
 
 /// How a two-layer foam is relaxed.
@@ -87,6 +90,9 @@ const HELD_UP_BY: f64 = 3.0;
 /// Sides below this part of the spacing are slivers: they are opened to that length before films are laid anew, and go if
 /// steps are held up. It lies below [`VANISHING`], so that what goes on shrinking changes the topology in the next steps.
 const SLIVER: f64 = 0.03;
+/// A cell whose patch on its wall has a rim shorter than this part of the spacing leaves the wall: patches of foams in balance have
+/// rims of a spacing and more, and one as small is squeezed by its own cell's pressure, the more the smaller it is.
+const SQUEEZED_OFF: f64 = 0.2;
 /// So many such steps on end, with nothing to go, and the films are laid anew; at most so often.
 const MOST_HELD_UP: usize = 4;
 const MOST_SPREADS: usize = 12;
@@ -109,13 +115,12 @@ pub fn relaxed(
     settings: &LayerSettings,
     progress: &mut dyn FnMut(&DescentStep<'_>) -> ControlFlow<()>,
 ) -> Result<Layers, NoLayers> {
-    let mut films = layer_films(&division, gap, FIRST_FINENESS);
-    let first_energy = energy(&films.complex, &films.places);
     let mut division = division;
     if settings.changes_topology {
         open(&mut division, gap, SLIVER * settings.spacing);
-        films = layer_films(&division, gap, FIRST_FINENESS);
     }
+    let films = layer_films(&division, gap, FIRST_FINENESS);
+    let first_energy = energy(&films.complex, &films.places);
     let mut run = Run {
         gap,
         settings,
@@ -137,14 +142,14 @@ pub fn relaxed(
         pressures = descent.pressures().clone();
         let asked_to_stop =
             descended.ending == Ending::Halted && shrinking.sides.is_empty() && !shrinking.stuck;
-        let goes_on = !asked_to_stop && steps < settings.step_limit;
+        let goes_on = !asked_to_stop && shrinking.leaving.is_empty() && steps < settings.step_limit;
         let vanish = !shrinking.sides.is_empty();
         let flipped = goes_on && vanish && settings.changes_topology && run.flip(&shrinking);
         let spread = goes_on && !flipped && stuck && run.spread();
         let refined = goes_on && !flipped && !spread && run.refine();
         if !(flipped || spread || refined) {
             let descended = Descended { steps, ..descended };
-            return Ok(run.end(&descent, descended, first_energy));
+            return Ok(run.end(&descent, descended, first_energy, shrinking.leaving));
         }
     }
 }
@@ -172,6 +177,14 @@ struct Vanishing {
     small: f64,
     /// Whether steps are held up although nothing vanishes.
     stuck: bool,
+    /// Cells that are squeezed off their wall.
+    leaving: Vec<usize>,
+}
+
+impl Vanishing {
+    fn is_none(&self) -> bool {
+        self.sides.is_empty() && !self.stuck && self.leaving.is_empty()
+    }
 }
 
 /// Changes of topology for each cell, after which no more are made: a foam that needs as many goes round in circles.
@@ -207,8 +220,9 @@ impl Run<'_> {
             before = now;
             held_up = if told.fraction < HELD_UP { held_up + 1 } else { 0 };
             shrinking.stuck = held_up >= MOST_HELD_UP && self.spreads < MOST_SPREADS;
+            shrinking.leaving = self.leaving(&before);
             let flow = progress(told);
-            if shrinking.sides.is_empty() && !shrinking.stuck { flow } else { ControlFlow::Break(()) }
+            if shrinking.is_none() { flow } else { ControlFlow::Break(()) }
         })?;
         Ok((descended, shrinking))
     }
@@ -232,7 +246,7 @@ impl Run<'_> {
         if !self.settings.changes_topology {
             let gone = |side: &&Side| now[*side] < VANISHED * self.settings.spacing;
             let sides = self.films.borders.keys().filter(gone).copied().collect();
-            return Vanishing { sides, small, stuck: false };
+            return Vanishing { sides, small, ..Vanishing::default() };
         }
         let sliver = |length: f64| held_up && length < SLIVER * self.settings.spacing;
         let short = |side: &Side, length: f64| length < limit && (length < before[side] || sliver(length));
@@ -252,7 +266,24 @@ impl Run<'_> {
             })
             .collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        Vanishing { sides: found.into_iter().map(|(_, side)| side).collect(), small, stuck: false }
+        let sides = found.into_iter().map(|(_, side)| side).collect();
+        Vanishing { sides, small, ..Vanishing::default() }
+    }
+
+    /// Cells whose patch on their own wall has shrunk to next to nothing.
+    fn leaving(&self, now: &Lengths) -> Vec<usize> {
+        let mut rims = vec![0.0; self.division.seeds.len()];
+        for polygon in &self.division.polygons {
+            let count = polygon.corners.len();
+            for (at, _) in self.division.wall_sides(polygon) {
+                let (side, _) = side_between(polygon.corners[at], polygon.corners[(at + 1) % count]);
+                let length = now.get(&side).copied().unwrap_or(f64::INFINITY);
+                rims[polygon.cell] += length;
+                rims[polygon.neighbour] += length;
+            }
+        }
+        let gone = |cell: &usize| rims[*cell] < SQUEEZED_OFF * self.settings.spacing;
+        (0..rims.len()).filter(gone).collect()
     }
 
     /// Takes over where a descent has brought the nodes.
@@ -320,7 +351,7 @@ impl Run<'_> {
         coarser
     }
 
-    fn end(self, descent: &Descent, descended: Descended, first_energy: f64) -> Layers {
+    fn end(self, descent: &Descent, descended: Descended, first_energy: f64, leaving: Vec<usize>) -> Layers {
         let vanishing = if descended.ending == Ending::Converged {
             Vec::new()
         } else {
@@ -335,6 +366,7 @@ impl Run<'_> {
             descended,
             flips: self.flips,
             vanishing,
+            leaving,
             division: self.division,
             films: self.films,
         }

@@ -44,8 +44,6 @@ pub(super) struct Layout {
     pub(super) closed_parts: Vec<Vec<RegionId>>,
     /// All nodes, masters before their slaves.
     pub(super) order_of_motion: Vec<NodeId>,
-    /// The matrix's entries, row and column: each film's, each bounding node's own block, the diagonal.
-    pub(super) entries: Vec<(u32, u32)>,
 }
 
 impl Layout {
@@ -91,18 +89,21 @@ impl Layout {
             .iter()
             .map(|film| film_layout(complex, film, &depths, &freedoms, &of_freedom, &of_pressure))
             .collect();
-        let entries = entries(&films, &freedoms, &of_freedom, unknowns);
-        Self {
-            freedoms,
-            of_freedom,
-            of_pressure,
-            unknowns,
-            pressures,
-            films,
-            closed_parts,
-            order_of_motion,
-            entries,
+        Self { freedoms, of_freedom, of_pressure, unknowns, pressures, films, closed_parts, order_of_motion }
+    }
+
+    /// The lower triangle's entries, row and column, in the order in which values are given: each film's, each bounding node's
+    /// own block, the diagonal.
+    pub(super) fn entries(&self) -> Vec<(u32, u32)> {
+        let mut entries = Vec::new();
+        let blocks = self.freedoms.iter().map(|&(first, own)| &self.of_freedom[first..first + own]);
+        for unknowns in self.films.iter().map(|film| &film.unknowns[..]).chain(blocks) {
+            let places =
+                lower_pairs(unknowns).map(|(_, _, row, column)| (checked_u32(row), checked_u32(column)));
+            entries.extend(places);
         }
+        entries.extend((0..checked_u32(self.unknowns)).map(|at| (at, at)));
+        entries
     }
 }
 
@@ -214,26 +215,6 @@ fn film_layout(
     let mut unknowns: Vec<Option<usize>> = own.iter().map(|&freedom| of_freedom[freedom]).collect();
     unknowns.extend([of_pressure[film.back.region], of_pressure[film.front.region]]);
     FilmLayout { nodes, rows, inner, inner_masters, freedoms: own, unknowns }
-}
-
-/// The lower triangle's entries in the order in which values are given: each film's, each bounding node's own block, the
-/// diagonal.
-fn entries(
-    films: &[FilmLayout],
-    freedoms: &IndexVec<NodeId, (usize, usize)>,
-    of_freedom: &[Option<usize>],
-    unknowns: usize,
-) -> Vec<(u32, u32)> {
-    let pair = |(_, _, row, column)| (checked_u32(row), checked_u32(column));
-    let mut entries = Vec::new();
-    for film in films {
-        entries.extend(lower_pairs(&film.unknowns).map(pair));
-    }
-    for &(first, own) in freedoms {
-        entries.extend(lower_pairs(&of_freedom[first..first + own]).map(pair));
-    }
-    entries.extend((0..unknowns).map(|at| pair((at, at, at, at))));
-    entries
 }
 
 /// All pairs of places in `unknowns` on or below the diagonal of the matrix: the two places, then row and column.

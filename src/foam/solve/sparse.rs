@@ -29,7 +29,7 @@ pub(super) struct Symbolic(Arc<SymmetricPattern>);
 
 impl Symbolic {
     pub(super) fn new(layout: &Layout) -> Result<Self, FactorError> {
-        SymmetricPattern::new(layout.unknowns, layout.entries.clone()).map(|pattern| Self(Arc::new(pattern)))
+        SymmetricPattern::new(layout.unknowns, layout.entries()).map(|pattern| Self(Arc::new(pattern)))
     }
 }
 

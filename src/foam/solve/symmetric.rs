@@ -1,7 +1,7 @@
 //! A sparse symmetric, possibly indefinite matrix from any list of entries, factored as LDLᵀ with a fill-reducing order; its
 //! inertia is read from the signs of D.
 //!
-//! A complex numbers its unknowns by its own layout (`layout.rs`); Surface Evolver's systems come as they are.
+//! For systems that are not made of films, too; a complex has its own layout (`layout.rs`) and refinement (`sparse.rs`).
 
 use super::{fronts::Fronts, sparse::FactorError, supernodes};
 use crate::index::checked_u32;
