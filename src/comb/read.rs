@@ -118,7 +118,9 @@ pub(crate) fn read(
     let pitch = estimate.pitch * scale;
     let part = pyramid.part();
     let mut survey = survey(pyramid, estimate.polarity, scale, pitch);
-    add_missed(&mut survey, pitch);
+    let relief = survey.relief.blurred(RELIEF_BLUR * pitch);
+    let coarse = coarse(&relief);
+    add_missed(&mut survey, &coarse);
     let origin = DVec2::new(part.left as f64, part.top as f64);
     let to_raster = |point: DVec2| (point - origin) * scale;
     settings.corrections.place(&mut survey.sites, to_raster, pitch)?;
@@ -129,17 +131,16 @@ pub(crate) fn read(
         survey.sites.retain(|site| !hidden[at(site.position)]);
     }
     let joined = settings.corrections.joined(&survey.sites, to_raster, pitch)?;
-    let segmented = segment(&survey, pitch, hidden.as_deref(), &joined);
+    let segmented = segment(&survey, [relief, coarse], hidden.as_deref(), &joined);
     Ok(count(&survey, segmented, scale))
 }
 
 /// Adds the cells that the lattice missed because they are seen obliquely. Half the resolution is enough to find them.
-fn add_missed(survey: &mut Survey, pitch: f64) {
-    let coarse = coarse(&survey.relief.blurred(RELIEF_BLUR * pitch));
+fn add_missed(survey: &mut Survey, coarse: &Plane) {
     let unit = COARSE as f64;
     let positions: Vec<DVec2> = survey.sites.iter().map(|site| site.position / unit).collect();
     let local = |place: DVec2| survey.field.at(place * unit) / unit;
-    let missed = openings::missed(&coarse, &survey.sites, &positions, local);
+    let missed = openings::missed(coarse, &survey.sites, &positions, local);
     for site in missed.replaced.into_iter().rev() {
         survey.sites.remove(site);
     }
@@ -179,12 +180,16 @@ struct Segmented {
     walls: BTreeMap<(usize, usize), Wall>,
 }
 
-fn segment(survey: &Survey, pitch: f64, hidden: Option<&[bool]>, joined: &[(usize, usize)]) -> Segmented {
-    let relief = survey.relief.blurred(RELIEF_BLUR * pitch);
+fn segment(
+    survey: &Survey,
+    [relief, coarse]: [Plane; 2],
+    hidden: Option<&[bool]>,
+    joined: &[(usize, usize)],
+) -> Segmented {
     let mut centres: Vec<DVec2> = survey.sites.iter().map(|s| s.position).collect();
     let pitches: Vec<f64> =
         survey.sites.iter().map(|site| site.width * survey.field.at(site.position)).collect();
-    centre(&mut centres, survey, &relief, &pitches, hidden);
+    centre(&mut centres, survey, [&relief, &coarse], &pitches, hidden);
     let mut segmentation = watershed::flood(&relief, &marked(&centres, &pitches, &survey.sites), hidden);
     let regions = walls::regions(&segmentation, &relief, &centres, &pitches);
     let walls = walls::walls(&segmentation, &relief, &regions);
@@ -221,8 +226,13 @@ fn marked(centres: &[DVec2], pitches: &[f64], sites: &[Site]) -> Vec<Marker> {
 }
 
 /// Moves the cells that were found to the middle of what a first flood gives them. Half the resolution is enough for that.
-fn centre(centres: &mut [DVec2], survey: &Survey, relief: &Plane, pitches: &[f64], hidden: Option<&[bool]>) {
-    let coarse = coarse(relief);
+fn centre(
+    centres: &mut [DVec2],
+    survey: &Survey,
+    [relief, coarse]: [&Plane; 2],
+    pitches: &[f64],
+    hidden: Option<&[bool]>,
+) {
     let hidden: Option<Vec<bool>> = hidden.map(|hidden| {
         let at = |i: usize| COARSE * (i / coarse.width() * relief.width() + i % coarse.width());
         (0..coarse.width() * coarse.height()).map(|i| hidden[at(i)]).collect()
@@ -230,8 +240,8 @@ fn centre(centres: &mut [DVec2], survey: &Survey, relief: &Plane, pitches: &[f64
     let unit = COARSE as f64;
     let markers: Vec<DVec2> = centres.iter().map(|c| *c / unit).collect();
     let pitches: Vec<f64> = pitches.iter().map(|p| p / unit).collect();
-    let first = watershed::flood(&coarse, &marked(&markers, &pitches, &survey.sites), hidden.as_deref());
-    let regions = walls::regions(&first, &coarse, &markers, &pitches);
+    let first = watershed::flood(coarse, &marked(&markers, &pitches, &survey.sites), hidden.as_deref());
+    let regions = walls::regions(&first, coarse, &markers, &pitches);
     for ((centre, region), site) in centres.iter_mut().zip(regions).zip(&survey.sites) {
         if site.depth == 0 && region.area > 0.0 && !region.on_border {
             *centre = region.centroid * unit;

@@ -5,10 +5,7 @@
 //! (`sliver.rs`), less that of a film that reaches beyond its wall, the energy is that of films which end on the wall, and
 //! cannot fall below the true minimum.
 
-use super::{
-    edge::add_differences,
-    sliver::{FootSlopes, Reach, across},
-};
+use super::sliver::{Foot, FootSlopes, Reach, across};
 use crate::foam::energy::Blocks;
 use glam::DVec3;
 
@@ -42,30 +39,25 @@ impl Rim {
         gradient: &mut [DVec3],
         hessian: Option<&mut Blocks>,
     ) {
-        self.add_gradient(factor, nodes, gradient);
-        if let Some(hessian) = hessian {
-            let gradient = |nodes: &[DVec3], out: &mut [DVec3]| self.add_gradient(factor, nodes, out);
-            add_differences(nodes, &gradient, hessian);
-        }
+        self.reach.add(self.side * factor, nodes, gradient, hessian, slopes);
     }
+}
 
-    fn add_gradient(&self, factor: f64, nodes: &[DVec3], gradient: &mut [DVec3]) {
-        self.reach.add_gradient(self.side * factor, nodes, gradient, |foot| {
-            let (d, z) = (foot.d, foot.z);
-            let mut by = FootSlopes::default();
-            for (s, weight) in across() {
-                let m = foot.at(s).1;
-                let normal = d.cross(m);
-                let length = normal.length();
-                let u = normal / length;
-                by.z += weight * (length + s * z * u.dot(d.cross(foot.turn)));
-                by.d += weight * z * m.cross(u);
-                by.along += weight * z * u.cross(d);
-                by.turn += weight * s * z * z * u.cross(d);
-            }
-            by
-        });
+/// The slopes of the area over one foot.
+fn slopes(foot: &Foot<'_>) -> FootSlopes {
+    let (d, z) = (foot.d, foot.z);
+    let mut by = FootSlopes::default();
+    for (s, weight) in across() {
+        let m = foot.at(s).1;
+        let normal = d.cross(m);
+        let length = normal.length();
+        let u = normal / length;
+        by.z += weight * (length + s * z * u.dot(d.cross(foot.turn)));
+        by.d += weight * z * m.cross(u);
+        by.along += weight * z * u.cross(d);
+        by.turn += weight * s * z * z * u.cross(d);
     }
+    by
 }
 
 #[cfg(test)]

@@ -140,13 +140,30 @@ impl Reach {
         sums
     }
 
-    /// Adds `factor` times the gradient of such a sum by the nodes, from the slopes of its shares.
-    pub(super) fn add_gradient(
+    /// Adds `factor` times the gradient of such a sum by the nodes, from the slopes of its shares, and the Hessian where it is
+    /// asked for.
+    pub(super) fn add(
         &self,
         factor: f64,
         nodes: &[DVec3],
         gradient: &mut [DVec3],
+        hessian: Option<&mut Blocks>,
         slopes: impl Fn(&Foot<'_>) -> FootSlopes,
+    ) {
+        let add_gradient =
+            |nodes: &[DVec3], out: &mut [DVec3]| self.add_gradient(factor, nodes, out, &slopes);
+        add_gradient(nodes, gradient);
+        if let Some(hessian) = hessian {
+            add_differences(nodes, &add_gradient, hessian);
+        }
+    }
+
+    fn add_gradient(
+        &self,
+        factor: f64,
+        nodes: &[DVec3],
+        gradient: &mut [DVec3],
+        slopes: &impl Fn(&Foot<'_>) -> FootSlopes,
     ) {
         let (mut normals, mut turns) = ([DVec3::ZERO; 3], [DMat3::ZERO; 3]);
         for (at, &node) in nodes.iter().enumerate() {
@@ -210,28 +227,22 @@ impl Sliver {
         gradient: &mut [DVec3],
         hessian: Option<&mut Blocks>,
     ) {
-        self.add_gradient(factor, nodes, gradient);
-        if let Some(hessian) = hessian {
-            let gradient = |nodes: &[DVec3], out: &mut [DVec3]| self.add_gradient(factor, nodes, out);
-            add_differences(nodes, &gradient, hessian);
-        }
+        self.reach.add(factor, nodes, gradient, hessian, |foot| self.slopes(foot));
     }
 
-    fn add_gradient(&self, factor: f64, nodes: &[DVec3], gradient: &mut [DVec3]) {
-        self.reach.add_gradient(factor, nodes, gradient, |foot| {
-            let &Foot { d, turn, z, .. } = foot;
-            let mut by = FootSlopes::default();
-            for (s, weight) in across() {
-                let (q, m) = foot.at(s);
-                let (w, u) = self.pulled(q, (z * d).cross(m));
-                by.x += weight * u;
-                by.z += weight * (s * u.dot(d) + w.dot(d.cross(m)) + s * z * w.dot(d.cross(turn)));
-                by.d += weight * z * (s * u + m.cross(w));
-                by.along += weight * z * w.cross(d);
-                by.turn += weight * s * z * z * w.cross(d);
-            }
-            by
-        });
+    fn slopes(&self, foot: &Foot<'_>) -> FootSlopes {
+        let &Foot { d, turn, z, .. } = foot;
+        let mut by = FootSlopes::default();
+        for (s, weight) in across() {
+            let (q, m) = foot.at(s);
+            let (w, u) = self.pulled(q, (z * d).cross(m));
+            by.x += weight * u;
+            by.z += weight * (s * u.dot(d) + w.dot(d.cross(m)) + s * z * w.dot(d.cross(turn)));
+            by.d += weight * z * (s * u + m.cross(w));
+            by.along += weight * z * w.cross(d);
+            by.turn += weight * s * z * z * w.cross(d);
+        }
+        by
     }
 
     /// The field at `q`, and the gradient there of its product with a constant `area`.

@@ -148,12 +148,19 @@ impl Complex {
         &'a self,
         element: &'a Element,
     ) -> impl Iterator<Item = (WallId, &'static [usize])> + 'a {
+        self.edges_on_walls(element).filter(|&(wall, _)| !self.walls[wall].field.cuts_off())
+    }
+
+    /// As [`Complex::wall_edges`], with the edges on planes that cut the gap off.
+    pub(crate) fn edges_on_walls<'a>(
+        &'a self,
+        element: &'a Element,
+    ) -> impl Iterator<Item = (WallId, &'static [usize])> + 'a {
         element.shape.edges().iter().flat_map(move |&edge| {
             let first = element.nodes[edge[0]].node;
             self.nodes[first]
                 .walls
                 .iter()
-                .filter(|&&wall| !self.walls[wall].field.cuts_off())
                 .filter(move |wall| {
                     edge.iter().all(|&at| self.nodes[element.nodes[at].node].walls.contains(wall))
                 })
