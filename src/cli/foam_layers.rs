@@ -8,9 +8,10 @@ use super::{
 };
 use crate::{
     foam::{
+        free::{FreeFoam, FreeSettings, corner_angles, relaxed, tetrahedral_angle},
         layers::{
-            Arrangement, Companions, Compared, Division, LayerFigures, LayerSettings, Layers, NoLayers,
-            charged, companions, corner_angles, layer_figures, plane_end, relaxed, sheets, tetrahedral_angle,
+            Arrangement, Companions, Compared, LayerFigures, NoLayers, charged, companions, divided,
+            layer_figures, plane_end, sheets,
         },
         relax::Ending,
         seeds::SeedError,
@@ -97,18 +98,24 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         watched(&bar, &stage, share)
     });
     let sheets = sheets.map_err(failed)?;
-    let division = Division::new(&gap, &domain, &sheets).map_err(failed)?;
+    let division = divided(&gap, &domain, &sheets).map_err(failed)?;
     // The same number of elements on each half side; the default is the coarsest.
     let fineness = if fine { settings.relax.strips.along } else { 1 };
     let tolerance = settings.relax.tolerance.max(1e-10);
-    let how = LayerSettings { fineness, tolerance, ..LayerSettings::new(arrangement, sheets.spacing) };
+    let how = FreeSettings {
+        fineness,
+        tolerance,
+        // An arrangement that has a name stays what it is.
+        changes_topology: arrangement == Arrangement::Annealed,
+        ..FreeSettings::new(sheets.spacing)
+    };
     let mut steps = 0;
     let layers = relaxed(division, &gap, &how, &mut |told| {
         steps += 1;
         bar.set_message(format!("Newton step {steps}, force {:.1e}", told.residuals.force));
         interrupt::flow()
     });
-    let layers = layers.map_err(failed)?;
+    let layers = layers.map_err(CliError::failure)?;
     bar.finish_and_clear();
     let figures = layer_figures(&layers.division);
     let sides = [&figures[0].sides[..], &figures[1].sides].concat();
@@ -169,7 +176,7 @@ fn as_f64(count: usize) -> f64 {
 
 fn failed(error: NoLayers) -> CliError {
     match error {
-        NoLayers::Sown(SeedError::Interrupted { .. }) | NoLayers::Factor(_) | NoLayers::Lost { .. } => {
+        NoLayers::Sown(SeedError::Interrupted { .. }) | NoLayers::Lost { .. } => {
             CliError::failure(anyhow!("{error}"))
         }
         _ => CliError::mistake(error),
@@ -177,14 +184,14 @@ fn failed(error: NoLayers) -> CliError {
 }
 
 /// Mean and largest distance of the corners' angles from the tetrahedral angle, in degrees.
-fn angles(layers: &Layers) -> [f64; 2] {
+fn angles(layers: &FreeFoam) -> [f64; 2] {
     let angles = corner_angles(layers);
     let off = |angle: &f64| (angle - tetrahedral_angle()).to_degrees();
     let worst = angles.iter().map(|angle| off(angle).abs()).fold(0.0, f64::max);
     [angles.iter().map(off).sum::<f64>() / as_f64(angles.len().max(1)), worst]
 }
 
-fn ended(layers: &Layers) -> String {
+fn ended(layers: &FreeFoam) -> String {
     let descended = &layers.descended;
     let vanishing = layers.vanishing.len();
     match descended.ending {
@@ -210,7 +217,7 @@ fn cells_of(count: usize) -> String {
     if count == 1 { "a cell".to_owned() } else { format!("{count} cells") }
 }
 
-fn table(summary: &Summary<'_>, layers: &Layers) -> Vec<Line> {
+fn table(summary: &Summary<'_>, layers: &FreeFoam) -> Vec<Line> {
     let mut lines = vec![
         ("space", summary.space.to_string()),
         ("cells on each wall", summary.cells_on_each_wall.to_string()),

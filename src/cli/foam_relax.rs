@@ -3,6 +3,7 @@
 use super::{
     CliError,
     foam_figures::{AnnealingFigures, Figures, table},
+    foam_free::{self, Origin},
     foam_run,
     foam_settings::FoamSettings,
     interrupt,
@@ -94,6 +95,18 @@ pub(super) fn run(
     let mut keeper = Keeper::new(&job, bar, Some(folder.target().join(CHECKPOINT)), Vec::new());
     let relaxed = keeper.relax(Begin::Network(start.network), gap)?;
     let until_relaxed = began.elapsed().as_secs_f64();
+    if goes_on(&relaxed) {
+        let gap_volume = Some(start.partition.volume());
+        let (seeds, network) = (Some(&start.seeds), &relaxed.state);
+        let origin = Origin { job: &job, settings, seeds, gap, gap_volume, network };
+        let seconds = vec![
+            ("seeds and partition", until_partition),
+            ("films from wall to wall", until_relaxed - until_partition),
+        ];
+        let checkpoint = folder.target().join(CHECKPOINT);
+        foam_free::run(&origin, keeper.record, seconds, bar, folder)?;
+        return remove(&checkpoint);
+    }
     let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, bar)?;
     let made = Made::new(&job, gap, relaxed, keeper.record)?.finished(&job, settings, gap, annealing)?;
     made.fills(start.partition.volume())?;
@@ -121,12 +134,25 @@ pub(super) fn resume(checkpoint: Checkpoint, mut settings: FoamSettings) -> Resu
     let began = Instant::now();
     let mut keeper = Keeper::new(&job, &bar, Some(folder.target().join(CHECKPOINT)), record);
     let relaxed = keeper.relax(Begin::State(state), &gap)?;
+    if goes_on(&relaxed) {
+        let (settings, gap, network) = (&settings, &gap, &relaxed.state);
+        let origin = Origin { job: &job, settings, seeds: None, gap, gap_volume: None, network };
+        let seconds = vec![("films from wall to wall, resumed", began.elapsed().as_secs_f64())];
+        let checkpoint = folder.target().join(CHECKPOINT);
+        foam_free::run(&origin, keeper.record, seconds, &bar, folder)?;
+        return remove(&checkpoint);
+    }
     let (relaxed, annealing) = annealed(&job, &gap, relaxed, settings.anneal, &bar)?;
     let made = Made::new(&job, &gap, relaxed, keeper.record)?.finished(&job, &settings, &gap, annealing)?;
     let seconds = vec![("relaxation, resumed", began.elapsed().as_secs_f64())];
     write_all(&mut folder, &job, &settings, &gap, &made, None, seconds)?;
     bar.finish_and_clear();
     end(folder, &job, &made)
+}
+
+/// Whether a foam that ended where a film vanishes on one wall goes on with free topology.
+fn goes_on(relaxed: &Relaxed) -> bool {
+    matches!(relaxed.stop, Stop::TooWide { .. })
 }
 
 impl Job {
@@ -333,7 +359,7 @@ impl Made {
     }
 }
 
-fn no_pattern(defects: Vec<crate::tessellation::PatternDefect>) -> CliError {
+pub(super) fn no_pattern(defects: Vec<crate::tessellation::PatternDefect>) -> CliError {
     let first = defects.first().map(ToString::to_string).unwrap_or_default();
     CliError::failure(anyhow!("the foam gave no pattern: {} defects, such as: {first}", defects.len()))
 }

@@ -32,6 +32,7 @@ mod foam;
 mod foam_batch;
 mod foam_bubble;
 mod foam_figures;
+mod foam_free;
 mod foam_layers;
 mod foam_relax;
 mod foam_run;

@@ -17,7 +17,8 @@
 //! | pressures against sides and curvature, cell by cell | `audit.rs` |
 //! | who touches whom, for the comparison with combs | `pattern.rs` |
 //! | one bubble, held or free, and the landscape of its energy | `bubble/` |
-//! | foams of two layers, as in natural comb | `layers/` |
+//! | cells that touch others on one wall than on the other, or one wall only | `free/` |
+//! | foams of two layers, as in natural comb, on their way into `free/` | `layers/` |
 //!
 //! Not promised: a relaxed foam is a local minimum; other seeds may lie lower, and annealing (`relax/anneal.rs`) finds some of
 //! them. Energies are those of the mesh: their error falls with the fourth power of the number of elements along a film, is
@@ -28,9 +29,10 @@
 //! end on them at a right angle, and cells at them are cut (`network/rim.rs`, `complex/rim.rs`, `topology.rs`). A cell there
 //! may cover one corner of the box and end at planes that do not face each other; too few cells for that are refused.
 //!
-//! One layer means that cells have the same neighbours on both walls. Where walls are far apart for their curvature there is
-//! no such foam: on the P-surface beyond about Φ = ±0.7, where a film is squeezed to nothing on the inner side of a neck while
-//! it is long on the outer. `relax/widen.rs` goes as far as there is one and says where the next one ends.
+//! A network has films from wall to wall, so that cells have the same neighbours on both walls. Where walls are far apart for
+//! their curvature there is no such foam: on the P-surface beyond about Φ = ±0.6, where a film is squeezed to nothing on the
+//! inner side of a neck while it is long on the outer. `relax/widen.rs` goes as far as there is one and says where the next one
+//! ends. `free/` goes on: neighbours change on that wall alone, and films grow from it down to corners inside the gap.
 //!
 //! Films meet walls at a right angle, and no other angle is offered: Young's law for a film between the cells *a* and *b* is
 //! cos θ = (γ_wa − γ_wb)/γ with the wall's energies γ_w under each, and these are the same where all cells hold the same gas
@@ -44,6 +46,7 @@ pub mod audit;
 pub mod bubble;
 pub mod complex;
 pub mod energy;
+pub mod free;
 pub mod layers;
 pub mod network;
 pub mod relax;

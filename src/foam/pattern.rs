@@ -2,6 +2,7 @@
 
 use super::{
     domain::{Axis, Domain},
+    free::{FreeFoam, WallLine},
     partition::{Beyond, Partition, PartitionCell, Side},
     relax::State,
 };
@@ -79,6 +80,54 @@ pub fn pattern_of_state(
     let cells: IndexVec<CellId, Cell> = network.cells().map(cell).collect();
     let surroundings = if network.planes().is_empty() {
         Surroundings::Closed { euler_characteristic: network.euler_characteristic() }
+    } else {
+        Surroundings::Open
+    };
+    CellPattern::new("L", surroundings, cells)
+}
+
+/// The pattern of the cells of a foam of free topology on one wall. Lengths are in the surface's unit, `L`.
+///
+/// # Errors
+/// Every [`PatternDefect`] found.
+pub fn pattern_of_free(
+    foam: &FreeFoam,
+    gap: &Gap,
+    wall: WallSide,
+) -> Result<CellPattern, Vec<PatternDefect>> {
+    let cell = |(id, lines): (usize, Vec<WallLine>)| {
+        let outline: Vec<DVec3> = lines
+            .iter()
+            .flat_map(|line| &line.points[..line.points.len().saturating_sub(1)])
+            .copied()
+            .collect();
+        let count = f64::from(crate::index::checked_u32(outline.len().max(1)));
+        let midst =
+            if outline.is_empty() { foam.division.seeds[id] } else { outline.iter().sum::<DVec3>() / count };
+        let (position, surface) = placed(midst, gap, PatternPlace::Wall(wall));
+        let walls: Vec<CellWall> = lines
+            .iter()
+            .map(|line| CellWall {
+                neighbour: line.neighbour.map(CellId::from_index),
+                shift: line.shift,
+                length: length(&line.points, &[]),
+            })
+            .collect();
+        let (sides, status) = counted(&walls);
+        Cell {
+            position,
+            normal: surface.normal(position),
+            sides,
+            status,
+            confidence: 1.0,
+            area: fan_area(position, &outline),
+            gauss_curvature: Some(surface.curvature(position).gauss),
+            walls,
+        }
+    };
+    let cells: IndexVec<CellId, Cell> = foam.outlines(gap, wall).into_iter().enumerate().map(cell).collect();
+    let surroundings = if foam.division.planes.is_empty() {
+        Surroundings::Closed { euler_characteristic: gap.middle().euler_characteristic() }
     } else {
         Surroundings::Open
     };

@@ -1,15 +1,19 @@
 //! A foam's tables and meshes.
 
-use super::folder::{OutputError, OutputFolder};
+use super::{
+    foam_surface::CellFigures,
+    folder::{OutputError, OutputFolder},
+};
 use crate::{
     foam::{
         checkpoint::StepRecord,
+        free::FreeFoam,
         partition::{Beyond, CellMesh, Partition},
         seeds::Seeds,
     },
     index::Id,
     surface::Gap,
-    tessellation::{CellPattern, CellStatus},
+    tessellation::{CellId, CellPattern, CellStatus},
 };
 use serde::Serialize;
 use std::io::{self, Write};
@@ -57,6 +61,61 @@ pub fn write_cells(
                 volume: volumes.get(index).copied().unwrap_or(f64::NAN),
                 pressure: pressures.and_then(|all| all.get(index).copied()),
                 gauss_curvature: cell.gauss_curvature,
+            })?;
+        }
+        table.flush()
+    })
+}
+
+/// One row of `cells.csv` of a foam of free topology.
+#[derive(Clone, Debug, Serialize)]
+struct FreeCellRow {
+    id: usize,
+    x: f64,
+    y: f64,
+    z: f64,
+    sides_lower: Option<u32>,
+    sides_upper: Option<u32>,
+    films: usize,
+    status: CellStatus,
+    volume: f64,
+    pressure: f64,
+    gauss_curvature: f64,
+}
+
+/// Writes `cells.csv` of a foam of free topology: centres in the unit of the surface, sides on the lower and on the upper wall,
+/// films, status, volume, pressure less the mean, Gaussian curvature of the middle surface. `patterns` are those of the walls.
+///
+/// # Errors
+/// [`OutputError`] if the file cannot be written.
+pub fn write_free_cells(
+    folder: &mut OutputFolder,
+    foam: &FreeFoam,
+    patterns: &[CellPattern; 2],
+    figures: &CellFigures,
+) -> Result<(), OutputError> {
+    let mut films = vec![0; foam.division.seeds.len()];
+    for film in &foam.division.polygons {
+        films[film.cell] += 1;
+        films[film.neighbour] += 1;
+    }
+    folder.write("cells.csv", |writer| {
+        let mut table = csv::Writer::from_writer(writer);
+        for (index, &films) in films.iter().enumerate() {
+            let [lower, upper] = patterns.each_ref().map(|pattern| &pattern.cells[CellId::from_index(index)]);
+            let [x, y, z] = lower.position.midpoint(upper.position).to_array();
+            table.serialize(FreeCellRow {
+                id: index,
+                x,
+                y,
+                z,
+                sides_lower: lower.sides,
+                sides_upper: upper.sides,
+                films,
+                status: lower.status,
+                volume: figures.volumes[index],
+                pressure: figures.pressures[index],
+                gauss_curvature: figures.gauss_curvature[index],
             })?;
         }
         table.flush()

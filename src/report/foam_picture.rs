@@ -118,7 +118,9 @@ impl FoamScene {
             });
             match piece.kind {
                 PieceKind::Film { .. } => drawn.films.extend(polygons.flat_map(|points| {
-                    let flat = (points[2] - points[0]).cross(points[3] - points[1]).normalize_or_zero();
+                    let around = (1..points.len() - 1)
+                        .map(|at| (points[at] - points[0]).cross(points[at + 1] - points[0]));
+                    let flat = around.sum::<DVec3>().normalize_or_zero();
                     fan(&points, |_| flat)
                 })),
                 PieceKind::Wall(WallSide::Lower) => {

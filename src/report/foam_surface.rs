@@ -2,6 +2,8 @@
 
 use crate::{
     foam::{
+        complex::{Film, RegionImage},
+        free::{FreeFoam, WallLine},
         network::{CellId, EdgeId, HalfEdgeId},
         relax::State,
     },
@@ -9,6 +11,7 @@ use crate::{
     surface::{Gap, WallSide},
 };
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// What a piece of surface is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,15 +63,68 @@ pub fn pieces(state: &State, gap: &Gap) -> Vec<Piece> {
     let patches = WallSide::BOTH.into_iter().flat_map(|side| {
         network.cells().map(move |cell| {
             let row = if side == WallSide::Lower { 0 } else { state.rows() - 1 };
-            let edge = state.outline_at(cell, row);
-            let (points, mut polygons) = patch(&edge, gap, side);
-            if side == WallSide::Lower {
-                polygons.iter_mut().for_each(|polygon| polygon.reverse());
-            }
-            Piece { kind: PieceKind::Wall(side), cell, points, outline: edge.len(), polygons }
+            wall_piece(cell, &state.outline_at(cell, row), gap, side)
         })
     });
     films.chain(patches).collect()
+}
+
+/// The same pieces of a foam of free topology.
+#[must_use]
+pub fn free_pieces(foam: &FreeFoam, gap: &Gap) -> Vec<Piece> {
+    let films = foam.films.complex.films.iter().flat_map(|film| {
+        let (points, polygons) = facets(foam, film);
+        let far = foam.films.complex.period.translation(film.front.shift);
+        let cell = |side: RegionImage| CellId::from_index(side.region.index());
+        let kind = PieceKind::Film { neighbour: cell(film.front) };
+        let here = Piece { kind, cell: cell(film.back), points, outline: 0, polygons };
+        let beyond = (film.front.shift != film.back.shift).then(|| Piece {
+            kind: PieceKind::Film { neighbour: cell(film.back) },
+            cell: cell(film.front),
+            points: here.points.iter().map(|&point| point - far).collect(),
+            outline: 0,
+            polygons: here.polygons.iter().map(|corners| corners.iter().rev().copied().collect()).collect(),
+        });
+        std::iter::once(here).chain(beyond)
+    });
+    let patches = WallSide::BOTH.into_iter().flat_map(|side| {
+        foam.outlines(gap, side).into_iter().enumerate().filter(|(_, lines)| !lines.is_empty()).map(
+            move |(cell, lines)| {
+                let inner = |line: &WallLine| line.points[..line.points.len() - 1].to_vec();
+                let edge: Vec<DVec3> = lines.iter().flat_map(inner).collect();
+                wall_piece(CellId::from_index(cell), &edge, gap, side)
+            },
+        )
+    });
+    films.chain(patches).collect()
+}
+
+/// The nodes of a film, and the triangles between them.
+fn facets(foam: &FreeFoam, film: &Film) -> (Vec<DVec3>, Vec<Vec<usize>>) {
+    let mut numbers: BTreeMap<(usize, [i32; 3]), usize> = BTreeMap::new();
+    let mut points = Vec::new();
+    let mut polygons = Vec::new();
+    for element in &film.elements {
+        for corners in element.shape.triangles() {
+            let numbered = corners.map(|at| {
+                let image = element.nodes[at];
+                *numbers.entry((image.node.index(), image.shift.to_array())).or_insert_with(|| {
+                    points.push(foam.place(image));
+                    points.len() - 1
+                })
+            });
+            polygons.push(numbered.to_vec());
+        }
+    }
+    (points, polygons)
+}
+
+fn wall_piece(cell: CellId, edge: &[DVec3], gap: &Gap, side: WallSide) -> Piece {
+    let (points, mut polygons) = patch(edge, gap, side);
+    if side == WallSide::Lower {
+        polygons.iter_mut().for_each(|polygon| polygon.reverse());
+    }
+    Piece { kind: PieceKind::Wall(side), cell, points, outline: edge.len(), polygons }
 }
 
 /// The line of a side with its end.

@@ -9,7 +9,8 @@ use super::{
 use crate::{
     foam::{
         complex::{Film, RegionImage},
-        layers::{LayerFigures, Layers},
+        free::FreeFoam,
+        layers::LayerFigures,
     },
     index::Id,
     surface::Gap,
@@ -37,10 +38,10 @@ struct CellRow {
 /// [`OutputError`] if it cannot be written.
 pub fn write_cells(
     folder: &mut OutputFolder,
-    layers: &Layers,
+    layers: &FreeFoam,
     figures: &[LayerFigures; 2],
 ) -> Result<(), OutputError> {
-    let lower = layers.division.lower;
+    let lower = layers.division.lower();
     let count = f64::from(crate::index::checked_u32(layers.pressures.len()));
     let mean = layers.pressures.iter().sum::<f64>() / count;
     folder.write("cells.csv", |writer| {
@@ -80,7 +81,7 @@ const SIDE: Colour = Colour([0xd8, 0xc6, 0x9a]);
 /// # Errors
 /// [`FigureError`] if the picture cannot be encoded.
 pub fn picture(
-    layers: &Layers,
+    layers: &FreeFoam,
     figures: &[LayerFigures; 2],
     gap: &Gap,
     title: &str,
@@ -110,8 +111,8 @@ fn towards_eye(gap: &Gap, layer: usize) -> DVec3 {
     }
 }
 
-fn panel(layers: &Layers, figures: &LayerFigures, layer: usize, gap: &Gap, size: [u32; 2]) -> Canvas {
-    let lower = layers.division.lower;
+fn panel(layers: &FreeFoam, figures: &LayerFigures, layer: usize, gap: &Gap, size: [u32; 2]) -> Canvas {
+    let lower = layers.division.lower();
     let is_here = |side: RegionImage| (side.region.index() < lower) == (layer == 0);
     let mut triangles: Vec<([DVec3; 3], Colour)> = Vec::new();
     for film in &layers.films.complex.films {
@@ -142,7 +143,7 @@ fn panel(layers: &Layers, figures: &LayerFigures, layer: usize, gap: &Gap, size:
 }
 
 /// A film's elements as triangles between their nodes.
-fn facets<'a>(layers: &'a Layers, film: &'a Film) -> impl Iterator<Item = [DVec3; 3]> + 'a {
+fn facets<'a>(layers: &'a FreeFoam, film: &'a Film) -> impl Iterator<Item = [DVec3; 3]> + 'a {
     film.elements.iter().flat_map(move |element| {
         let place = move |at: usize| layers.place(element.nodes[at]);
         element.shape.triangles().iter().map(move |corners| corners.map(place))

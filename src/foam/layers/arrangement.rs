@@ -1,10 +1,16 @@
 //! Two sheets of seeds.
 
-use super::{Division, NoLayers, layer_figures, plane_end, settle::settled, spacing};
+use super::{
+    NoLayers,
+    division::{check, divided_unchecked},
+    layer_figures, plane_end,
+    settle::settled,
+};
 use crate::{
     foam::{
         convert::as_f64,
         domain::Domain,
+        free::{Division, spacing},
         ground::gap_volume,
         seeds::{Progress, SeedSettings, sow},
         setup::FoamSpace,
@@ -223,19 +229,19 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
         Ok(Sheets { weights, seeds, lower: cells, spacing, volumes, patches, depth })
     };
     let settling = &mut |done| progress(SOWING + (1.0 - SOWING) * done);
-    let mut first = None;
+    let mut judged = false;
     for farther in FARTHER {
         let sheets = moved(farther)?;
-        let division = Division::unchecked(gap, &domain, &sheets)?;
-        if first.is_none() {
+        let Ok(division) = divided_unchecked(gap, &domain, &sheets) else { continue };
+        if !judged {
             refuse_deep(gap, &division, &places)?;
+            judged = true;
         }
-        if division.check(gap).is_ok() {
+        if check(&division).is_ok() {
             return settled(gap, &domain, sheets, settling);
         }
-        first.get_or_insert(sheets);
     }
-    settled(gap, &domain, first.map_or_else(|| moved(FARTHER[0]), Ok)?, settling)
+    settled(gap, &domain, moved(FARTHER[0])?, settling)
 }
 
 /// Refuses layers in which cells of few sides are so deep that they leave their walls. `places` are those of the seeds on the
@@ -247,10 +253,10 @@ fn refuse_deep(gap: &Gap, division: &Division, places: &[DVec3]) -> Result<(), N
     let deepest = few
         .map(|(cell, (_, &place))| {
             let layer = usize::from(!division.is_lower(cell));
-            slenderness(gap, &gap.walls()[layer], division.volumes[layer], place)
+            slenderness(gap, &gap.walls()[layer], division.volumes[cell], place)
         })
         .fold(0.0, f64::max);
-    if deepest > DEEPEST { Err(too_deep(deepest, division.lower)) } else { Ok(()) }
+    if deepest > DEEPEST { Err(too_deep(deepest, division.lower())) } else { Ok(()) }
 }
 
 /// The same before seeds are sown, of so many cells that some have five sides, where the layers are that deep everywhere.
@@ -278,8 +284,9 @@ fn too_deep(deepest: f64, cells: usize) -> NoLayers {
 /// The depth of a cell over its width at its wall.
 fn slenderness(gap: &Gap, wall: &Wall, volume: f64, place: DVec3) -> f64 {
     let height = height(wall, place);
-    // The least area that Steiner's formula may give is one where normals almost meet.
-    let area = volume / height * steiner(gap, wall, place).max(0.01);
+    // Where normals almost meet, a cell would end in a point.
+    let [filled, open] = steiner(gap, wall, place).map(|part| part.max(0.01));
+    let area = volume / height / filled * open;
     height / (2.0 / 3.0_f64.sqrt() * area).sqrt()
 }
 
@@ -288,17 +295,18 @@ fn height(wall: &Wall, place: DVec3) -> f64 {
     wall.level.abs() / wall.field.gradient(place).length()
 }
 
-/// The area of a wall over that of the middle surface below it (J. Steiner).
-fn steiner(gap: &Gap, wall: &Wall, place: DVec3) -> f64 {
+/// What lies between the middle surface and a wall over the prism of that height, and the wall's area over the middle surface's
+/// (J. Steiner).
+fn steiner(gap: &Gap, wall: &Wall, place: DVec3) -> [f64; 2] {
     let far = height(wall, place).copysign(wall.level);
     let Curvature { gauss, mean } = gap.middle().curvature(place);
-    (1.0 + far * (2.0 * mean + far * gauss)).max(0.0)
+    [1.0 + far * (mean + far * gauss / 3.0), 1.0 + far * (2.0 * mean + far * gauss)]
 }
 
 /// The mean area of a cell on its own wall.
 fn patches(gap: &Gap, middle: &SurfaceSamples, cells: usize) -> [f64; 2] {
     gap.walls().each_ref().map(|wall| {
-        let area = |point: &SurfacePoint| point.weight * steiner(gap, wall, point.position);
+        let area = |point: &SurfacePoint| point.weight * steiner(gap, wall, point.position)[1].max(0.0);
         middle.points().iter().map(area).sum::<f64>() / as_f64(cells)
     })
 }

@@ -14,8 +14,11 @@
 //! Source of the tests: B. Phipson and G. K. Smyth, "Permutation p-values should never be zero", Stat. Appl. Genet. Mol.
 //! Biol. 9 (2010), for `(1 + extreme)/(1 + trials)`.
 
-use super::{Division, division::CornerImage};
-use crate::foam::{bubble::Symmetry, convert::as_f64};
+use crate::foam::{
+    bubble::Symmetry,
+    convert::as_f64,
+    free::{CornerImage, Division},
+};
 use crate::surface::{Gap, LevelSet, Period};
 use glam::{DMat3, DQuat, DVec3, IVec3};
 use rand::{RngExt, SeedableRng};
@@ -95,7 +98,7 @@ pub fn charged(division: &Division, gap: &Gap, sides: &[usize]) -> [Charged; 2] 
         let midst = if count > 0.0 { sum / count } else { division.seeds[cell] };
         gap.middle().project(midst, 0.0).unwrap_or(midst)
     };
-    [0..division.lower, division.lower..cells].map(|layer| Charged {
+    [0..division.lower(), division.lower()..cells].map(|layer| Charged {
         places: layer.clone().map(place).collect(),
         charges: layer.map(|cell| 6.0 - as_f64(sides[cell])).collect(),
     })

@@ -9,8 +9,8 @@ use super::{NoLayers, Sheets};
 use crate::foam::partition::polyhedron::{Behind, Face, HalfSpace, Polyhedron};
 use crate::{
     foam::{
-        convert::as_f64,
         domain::{Domain, Image},
+        free::{Corner, CornerImage, Division, Polygon, Stacking, Unlawful, unlawful},
         spatial::Bins,
     },
     index::checked_u32,
@@ -19,54 +19,6 @@ use crate::{
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-
-/// A corner: an end of borders.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Corner {
-    /// Where it is.
-    pub place: DVec3,
-    /// The wall that it lies on; none for a corner where four or more cells meet.
-    pub wall: Option<WallSide>,
-}
-
-/// A corner of a film's polygon, seen from the film.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct CornerImage {
-    /// Its number.
-    pub corner: usize,
-    /// How many periods away.
-    pub shift: [i32; 3],
-}
-
-/// A film between two cells, before it is meshed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Polygon {
-    /// The cell that it is seen from.
-    pub cell: usize,
-    /// The cell behind it.
-    pub neighbour: usize,
-    /// Which image of the neighbour, in periods.
-    pub shift: IVec3,
-    /// Its corners, counter-clockwise seen from the neighbour, in the frame of `cell`.
-    pub corners: Vec<CornerImage>,
-}
-
-/// Cells of two layers and their films.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Division {
-    /// The seeds, those of the lower layer first.
-    pub seeds: Vec<DVec3>,
-    /// How many of them belong to the lower layer.
-    pub lower: usize,
-    /// The volume that each cell of the lower and of the upper layer shall have.
-    pub volumes: [f64; 2],
-    /// The lattice.
-    pub period: Period,
-    /// All corners.
-    pub corners: Vec<Corner>,
-    /// All films, each once.
-    pub polygons: Vec<Polygon>,
-}
 
 /// Neighbours are sought within this many spacings of a seed.
 const REACH: f64 = 5.0;
@@ -85,109 +37,75 @@ struct Cut {
     corners: Vec<(DVec3, Option<WallSide>)>,
 }
 
-impl Division {
-    /// Divides the gap between the seeds of `sheets`.
-    ///
-    /// # Errors
-    /// [`NoLayers`] if two seeds coincide or the cells are no two layers.
-    pub fn new(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
-        let division = Self::unchecked(gap, domain, sheets)?;
-        division.check(gap)?;
-        Ok(division)
-    }
+/// Divides the gap between the seeds of `sheets`.
+///
+/// # Errors
+/// [`NoLayers`] if two seeds coincide or the cells are no two layers.
+pub fn divided(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Division, NoLayers> {
+    let division = divided_unchecked(gap, domain, sheets)?;
+    check(&division)?;
+    Ok(division)
+}
 
-    /// The same, whether the cells are two layers or not.
-    pub(super) fn unchecked(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Self, NoLayers> {
-        let sheets = sheets.wrapped(domain);
-        let (sight, neighbours) = (Sight::new(gap), Neighbours::new(domain, &sheets));
-        let cells: Vec<Vec<Cut>> = (0..sheets.seeds.len())
-            .into_par_iter()
-            .map(|cell| cut_cell(&sight, &neighbours, &sheets, cell))
-            .collect::<Result<_, _>>()?;
-        let Sheets { seeds, lower, spacing, volumes, .. } = sheets;
-        let period = domain.period();
-        let mut division = Self { seeds, lower, volumes, period, corners: Vec::new(), polygons: Vec::new() };
-        let mut joiner = Joiner::new(domain.period(), JOINED * spacing);
-        for (cell, cuts) in cells.into_iter().enumerate() {
-            for cut in cuts {
-                // Each film once: from the cell of lower number, or along the positive period to its own image.
-                let first =
-                    cut.neighbour > cell || (cut.neighbour == cell && cut.shift.to_array() > [0, 0, 0]);
-                let mut corners: Vec<CornerImage> = Vec::with_capacity(cut.corners.len());
-                for (place, wall) in cut.corners {
-                    let image = joiner.image(place, wall);
-                    if corners.last() != Some(&image) && corners.first() != Some(&image) {
-                        corners.push(image);
-                    }
+/// The same, whether the cells are two layers or not.
+pub(super) fn divided_unchecked(gap: &Gap, domain: &Domain, sheets: &Sheets) -> Result<Division, NoLayers> {
+    let sheets = sheets.wrapped(domain);
+    let (sight, neighbours) = (Sight::new(gap), Neighbours::new(domain, &sheets));
+    let cells: Vec<Vec<Cut>> = (0..sheets.seeds.len())
+        .into_par_iter()
+        .map(|cell| cut_cell(&sight, &neighbours, &sheets, cell))
+        .collect::<Result<_, _>>()?;
+    let Sheets { seeds, lower, spacing, volumes, .. } = sheets;
+    let volumes = (0..seeds.len()).map(|cell| volumes[usize::from(cell >= lower)]).collect();
+    let (stacking, period) = (Stacking::Two { lower }, domain.period());
+    let mut division = Division {
+        seeds,
+        stacking,
+        volumes,
+        period,
+        planes: Vec::new(),
+        euler: i64::from(gap.middle().euler_characteristic()),
+        corners: Vec::new(),
+        polygons: Vec::new(),
+    };
+    let mut joiner = Joiner::new(domain.period(), JOINED * spacing);
+    for (cell, cuts) in cells.into_iter().enumerate() {
+        for cut in cuts {
+            // Each film once: from the cell of lower number, or along the positive period to its own image.
+            let first = cut.neighbour > cell || (cut.neighbour == cell && cut.shift.to_array() > [0, 0, 0]);
+            let mut corners: Vec<CornerImage> = Vec::with_capacity(cut.corners.len());
+            for (place, wall) in cut.corners {
+                let image = joiner.image(place, wall);
+                if corners.last() != Some(&image) && corners.first() != Some(&image) {
+                    corners.push(image);
                 }
-                if first && corners.len() > 2 {
-                    let (neighbour, shift) = (cut.neighbour, cut.shift);
-                    division.polygons.push(Polygon { cell, neighbour, shift, corners });
-                }
+            }
+            if first && corners.len() > 2 {
+                let (neighbour, shift) = (cut.neighbour, cut.shift);
+                division.polygons.push(Polygon { cell, neighbour, shift, corners });
             }
         }
-        division.corners = joiner.corners;
-        Ok(division)
     }
+    division.corners = joiner.corners;
+    Ok(division)
+}
 
-    /// The place of a corner's image.
-    #[must_use]
-    pub fn place(&self, image: CornerImage) -> DVec3 {
-        self.corners[image.corner].place + self.period.translation(IVec3::from_array(image.shift))
+/// The laws of two layers: every cell has its own wall and only that one, and on each wall cells, edges and corners have
+/// Euler's number.
+pub(super) fn check(division: &Division) -> Result<(), NoLayers> {
+    let found = unlawful(division);
+    let count = |wanted: bool| {
+        found.iter().filter(|law| matches!(law, Unlawful::Wall { touches, .. } if *touches == wanted)).count()
+    };
+    let (reaching, missing) = (count(true), count(false));
+    if reaching + missing > 0 {
+        return Err(NoLayers::Through { reaching, missing });
     }
-
-    /// Whether a cell belongs to the lower layer.
-    #[must_use]
-    pub fn is_lower(&self, cell: usize) -> bool {
-        cell < self.lower
-    }
-
-    /// The edges that a polygon has on a wall: the number of their first corner.
-    pub fn wall_sides<'a>(&'a self, polygon: &'a Polygon) -> impl Iterator<Item = (usize, WallSide)> + 'a {
-        let count = polygon.corners.len();
-        (0..count).filter_map(move |at| {
-            let wall = |at: usize| self.corners[polygon.corners[at % count].corner].wall;
-            let here = wall(at)?;
-            (wall(at + 1) == Some(here)).then_some((at, here))
-        })
-    }
-
-    /// The laws of two layers: every cell has its own wall and only that one, and on each wall cells, edges and corners have
-    /// Euler's number.
-    pub(super) fn check(&self, gap: &Gap) -> Result<(), NoLayers> {
-        let mut walls = vec![[false; 2]; self.seeds.len()];
-        let mut edges = [0_usize; 2];
-        for polygon in &self.polygons {
-            for (_, wall) in self.wall_sides(polygon) {
-                edges[wall as usize] += 1;
-                walls[polygon.cell][wall as usize] = true;
-                walls[polygon.neighbour][wall as usize] = true;
-            }
-        }
-        let count = |wrong: &dyn Fn(usize, &[bool; 2]) -> bool| {
-            walls
-                .iter()
-                .enumerate()
-                .filter(|(cell, walls)| wrong(usize::from(!self.is_lower(*cell)), walls))
-                .count()
-        };
-        let reaching = count(&|own, walls| walls[1 - own]);
-        let missing = count(&|own, walls| !walls[own]);
-        if reaching + missing > 0 {
-            return Err(NoLayers::Through { reaching, missing });
-        }
-        let euler = i64::from(gap.middle().euler_characteristic());
-        for side in WallSide::BOTH {
-            let cells = if side == WallSide::Lower { self.lower } else { self.seeds.len() - self.lower };
-            let corners = self.corners.iter().filter(|corner| corner.wall == Some(side)).count();
-            let found = i64::from(checked_u32(corners)) - i64::from(checked_u32(edges[side as usize]))
-                + i64::from(checked_u32(cells));
-            if found != euler {
-                return Err(NoLayers::Euler { found, expected: euler });
-            }
-        }
-        Ok(())
-    }
+    let euler = found.iter().find_map(|law| match *law {
+        Unlawful::Euler { found, expected, .. } => Some(NoLayers::Euler { found, expected }),
+        _ => None,
+    });
+    euler.map_or(Ok(()), Err)
 }
 
 fn cut_cell(
@@ -421,14 +339,8 @@ impl Joiner {
         }
         let corner = self.corners.len();
         let key = bucket(home);
-        self.corners.push(Corner { place, wall });
+        self.corners.push(Corner { place, wall, plane: None });
         self.buckets.entry(key).or_default().push(corner);
         CornerImage { corner, shift: [0; 3] }
     }
-}
-
-/// The spacing of `count` seeds on `area`, as of a hexagonal lattice.
-#[must_use]
-pub fn spacing(area: f64, count: usize) -> f64 {
-    (area / as_f64(count) * 2.0 / 3.0_f64.sqrt()).sqrt()
 }

@@ -1,19 +1,15 @@
 //! Foams of two layers: a sheet of cells on each wall, meeting at a middle network, as in the comb of bees.
 //!
-//! **Enters** a [`crate::surface::Gap`] and the number of cells on each wall. **Leaves** a film complex in balance: walls
-//! between cells of one layer, and the films in the middle that close the cells' ends.
+//! **Enters** a [`crate::surface::Gap`] and the number of cells on each wall. **Leaves** cells and films in two layers, which
+//! [`super::free`] relaxes: walls between cells of one layer, and the films in the middle that close the cells' ends.
 //!
 //! | step | file |
 //! |---|---|
 //! | two sheets of seeds: rhombic, Tóth's, or annealed on both sides | `arrangement.rs` |
 //! | annealed sheets settle together: plane films between power cells, of least area at equal volumes | `settle.rs`, `plane_films.rs` |
 //! | their power cells, cut off by the walls; corners, polygons | `division.rs` |
-//! | slivers among their sides opened | `open.rs` |
-//! | the film complex: each polygon as curved quadrilaterals round its middle | `films.rs` |
-//! | the descent to least energy at equal volumes | `relax.rs` |
-//! | borders and films that vanish: changes of topology | `flip/` |
 //! | ends with plane films: energies by formula | `ends.rs` |
-//! | side counts; angles at corners | `figures.rs` |
+//! | side counts | `figures.rs` |
 //! | how the defects of the two layers sit to each other | `companions.rs` |
 //!
 //! Each layer fills its side of the gap up to the middle surface, in equal cells. Annealed layers that are less high than half
@@ -24,9 +20,7 @@
 //! off at 1.9. Annealed patterns with such cells that are far deeper are refused before they are settled; nearer to the limit
 //! the foam ends where a cell leaves its wall, and says so.
 //!
-//! Not promised: balance. A change that would take a cell to the other wall, away from its own, or to a second film with a
-//! neighbour is not made, nor one at corners where more than four cells meet, as in the bees' arrangement; a foam that needs it
-//! ends as stalled, with the borders that vanish.
+//! Only annealed layers, which are no arrangement that has a name, change their topology.
 //!
 //! Sources: L. Fejes Tóth, "What the bees know and what they do not know", Bull. Amer. Math. Soc. 70 (1964); D. Weaire and
 //! R. Phelan, "Optimal design of honeycombs", Nature 367 (1994), who made both arrangements in foam between glass plates.
@@ -36,22 +30,16 @@ mod companions;
 mod division;
 mod ends;
 mod figures;
-mod films;
-mod flip;
-mod open;
 mod plane_films;
-mod relax;
 mod settle;
 
 pub use arrangement::{Arrangement, Sheets, sheets};
 pub use companions::{Chance, Charged, Companions, Compared, charged, companions};
-pub use division::{Corner, CornerImage, Division, Polygon, spacing};
+pub use division::divided;
 pub use ends::{PlaneEnd, plane_end};
-pub use figures::{LayerFigures, corner_angles, layer_figures, tetrahedral_angle};
-pub use films::{LayerFilms, Side, layer_films};
-pub use relax::{LayerSettings, Layers, relaxed};
+pub use figures::{LayerFigures, layer_figures};
 
-use crate::foam::{seeds::SeedError, setup::FoamSpace, solve::FactorError};
+use crate::foam::{seeds::SeedError, setup::FoamSpace};
 use glam::DVec3;
 
 /// Why there is no two-layer foam.
@@ -97,7 +85,7 @@ pub enum NoLayers {
     },
     /// Cells reach from wall to wall, or miss their own.
     #[error(
-        "of the cells settled between plane films, {reaching} reach the other wall and {missing} miss their own: the layers do not fit the gap; widen it or ask for more cells"
+        "of the cells settled between plane films, {reaching} reach the other wall and {missing} miss their own: the layers do not fit the gap. Cells that reach the other wall ask for a wider gap or for more cells, cells that miss their own for a narrower gap or for fewer"
     )]
     Through {
         /// How many reach the other wall.
@@ -117,7 +105,7 @@ pub enum NoLayers {
     },
     /// Cells of few sides are too deep.
     #[error(
-        "the layers are too deep: cells of five sides or fewer would be up to {deepest:.1} times as deep as they are wide at their wall, and from about 1.7 times on their pressure squeezes such cells off it; ask for {fitting:.0} cells on each wall or fewer, or for a narrower gap"
+        "the layers are too deep: cells of five sides or fewer would be up to {deepest:.1} times as deep as they are wide at their wall, and from about 1.7 times on their pressure squeezes such cells off it; ask for about {fitting:.0} cells on each wall, or for a narrower gap"
     )]
     Deep {
         /// The greatest depth of a cell over its width.
@@ -156,7 +144,4 @@ pub enum NoLayers {
         /// From where.
         place: DVec3,
     },
-    /// The system could not be solved.
-    #[error(transparent)]
-    Factor(#[from] FactorError),
 }

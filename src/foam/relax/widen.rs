@@ -5,8 +5,9 @@
 //! before. The walls move along the normals of their level sets, and the films with them.
 //!
 //! How far this goes is physics: at some width a film has shrunk to nothing on one wall while it is long on the other.
-//! Beyond it, cells would touch other neighbours on one wall than on the other, and there is no foam of one layer of films
-//! from wall to wall with these cells. [`Pinch`] says where; the foam of the widest gap reached is kept.
+//! Beyond it, cells touch other neighbours on one wall than on the other, and there is no foam of films that all reach from
+//! wall to wall with these cells. [`Pinch`] says where; the foam of the widest gap reached is kept, and
+//! [`crate::foam::free::widened`] goes on from it.
 
 use super::{Progress, RelaxError, RelaxSettings, Relaxed, Run, State, Stop, go_on, real};
 use crate::{

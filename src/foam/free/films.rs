@@ -33,9 +33,9 @@ pub(super) fn side_between(from: CornerImage, to: CornerImage) -> (Side, bool) {
     ((a.corner, b.corner, shift.to_array()), forward)
 }
 
-/// The films of two layers.
+/// The films of a foam of free topology.
 #[derive(Clone, Debug)]
-pub struct LayerFilms {
+pub struct FreeFilms {
     /// The complex: a region for each cell, a film for each polygon, the corners' nodes first.
     pub complex: Complex,
     /// The first places: plane films.
@@ -49,10 +49,22 @@ pub struct LayerFilms {
     inner: Vec<Range<usize>>,
 }
 
+impl FreeFilms {
+    /// Lines of another complex that films can be laid along by [`films_refined`].
+    pub(super) const fn of_lines(
+        complex: Complex,
+        places: Places,
+        borders: BTreeMap<Side, Vec<NodeImage>>,
+        wall_edges: BTreeMap<Side, Vec<NodeImage>>,
+    ) -> Self {
+        Self { complex, places, borders, wall_edges, inner: Vec::new() }
+    }
+}
+
 /// Builds the complex of `division` with `fineness` elements on each half side, or one on each whole side for 0, from plane
 /// films.
 #[must_use]
-pub fn layer_films(division: &Division, gap: &Gap, fineness: usize) -> LayerFilms {
+pub fn free_films(division: &Division, gap: &Gap, fineness: usize) -> FreeFilms {
     build(division, gap, fineness, None)
 }
 
@@ -61,9 +73,9 @@ pub(super) fn films_after(
     division: &Division,
     gap: &Gap,
     fineness: usize,
-    before: &LayerFilms,
+    before: &FreeFilms,
     renumbering: &Renumbering,
-) -> LayerFilms {
+) -> FreeFilms {
     let mut corners = vec![None; division.corners.len()];
     for (old, new) in renumbering.corners.iter().enumerate() {
         if let Some(new) = *new {
@@ -73,7 +85,7 @@ pub(super) fn films_after(
     build(division, gap, fineness, Some(&Before { films: before, corners, polygons: &renumbering.polygons }))
 }
 
-fn build(division: &Division, gap: &Gap, fineness: usize, before: Option<&Before<'_>>) -> LayerFilms {
+fn build(division: &Division, gap: &Gap, fineness: usize, before: Option<&Before<'_>>) -> FreeFilms {
     let mut builder = Builder::new(division, gap, fineness, before);
     let mut films = IndexVec::new();
     let mut inner = Vec::with_capacity(division.polygons.len());
@@ -84,14 +96,14 @@ fn build(division: &Division, gap: &Gap, fineness: usize, before: Option<&Before
         inner.push(nodes);
     }
     let regions = division.seeds.iter().map(|&anchor| Region { kind: RegionKind::Cell, anchor }).collect();
-    let walls: IndexVec<WallId, _> = gap.walls().to_vec().into();
+    let walls: IndexVec<WallId, _> = division.walls(gap).into();
     let Builder { nodes, places, sides, .. } = builder;
     let complex = Complex { period: division.period, walls, regions, nodes, films };
     let (on_walls, borders): (BTreeMap<_, _>, BTreeMap<_, _>) =
         sides.into_iter().partition(|(_, side)| side.is_on_wall);
     let nodes =
         |sides: BTreeMap<Side, SideNodes>| sides.into_iter().map(|(key, side)| (key, side.nodes)).collect();
-    LayerFilms { complex, places, borders: nodes(borders), wall_edges: nodes(on_walls), inner }
+    FreeFilms { complex, places, borders: nodes(borders), wall_edges: nodes(on_walls), inner }
 }
 
 /// Builds the complex anew with other elements, where the films are.
@@ -99,15 +111,15 @@ pub(super) fn films_refined(
     division: &Division,
     gap: &Gap,
     fineness: usize,
-    before: &LayerFilms,
-) -> LayerFilms {
+    before: &FreeFilms,
+) -> FreeFilms {
     let corners = (0..division.corners.len()).map(Some).collect();
     build(division, gap, fineness, Some(&Before { films: before, corners, polygons: &[] }))
 }
 
 /// Films before a change of topology or of the mesh.
 struct Before<'a> {
-    films: &'a LayerFilms,
+    films: &'a FreeFilms,
     /// The old number of each corner that was there.
     corners: Vec<Option<usize>>,
     /// The old number of each polygon that has kept its corners.
@@ -159,7 +171,7 @@ impl<'a> Builder<'a> {
             .corners
             .iter()
             .map(|corner| Node {
-                walls: corner.wall.map(wall_id).into_iter().collect(),
+                walls: corner.wall.map(wall_id).into_iter().chain(corner.plane.map(plane_id)).collect(),
                 motion: Motion::Free,
             })
             .collect();
@@ -198,6 +210,8 @@ impl<'a> Builder<'a> {
         let (start, end) =
             (self.places[first], self.places[last] + self.division.period.translation(relative));
         let count = 2 * self.half;
+        let image = |corner, shift| CornerImage { corner, shift };
+        let plane = self.division.plane_of_side(image(key.0, [0; 3]), image(key.1, key.2));
         let mut nodes = vec![NodeImage { node: first, shift: IVec3::ZERO }];
         for at in 1..count {
             let part = as_f64(at) / as_f64(count);
@@ -205,7 +219,11 @@ impl<'a> Builder<'a> {
             let kept = self.before.and_then(|before| before.on_side(key, part));
             let straight = kept.unwrap_or_else(|| start.lerp(end, part));
             let (node, place) = match wall {
-                None => (Node { walls: Vec::new(), motion: Motion::Border(masters) }, straight),
+                None => {
+                    let place = self.division.retracted(self.gap, None, plane, straight);
+                    let walls = plane.map(plane_id).into_iter().collect();
+                    (Node { walls, motion: Motion::Border(masters) }, place)
+                }
                 Some(side) => {
                     let place = self.gap.wall(side).project(straight).unwrap_or(straight);
                     (Node { walls: vec![wall_id(side)], motion: Motion::Inner(masters) }, place)
@@ -331,6 +349,11 @@ impl<'a> Builder<'a> {
 
 fn wall_id(side: WallSide) -> WallId {
     WallId::from_index(side as usize)
+}
+
+/// Planes follow the walls.
+fn plane_id(plane: usize) -> WallId {
+    WallId::from_index(WallSide::BOTH.len() + plane)
 }
 
 /// A polygon laid flat: the nodes round it.

@@ -1,37 +1,42 @@
-//! The descent of a two-layer foam, with changes of topology where a border vanishes on the way.
+//! The descent of a foam of free topology, which changes where a border vanishes on the way.
 
 use super::{
-    Arrangement, Division, LayerFilms, NoLayers,
+    Division, FreeFilms, Unlawful,
+    division::spacing,
     films::{Side, films_after, films_refined, side_between},
     flip::{Cluster, Moves},
-    layer_films,
+    free_films,
+    laws::unlawful,
     open::open,
 };
 use crate::foam::{
     complex::{NodeId, NodeImage, Places, RegionId},
     convert::as_f64,
     energy::energy,
-    relax::{Descended, Descent, DescentSettings, DescentStep, Ending},
+    relax::{Descended, Descent, DescentSettings, DescentStep, Ending, State},
+    solve::FactorError,
 };
 use crate::{
     index::{Id, IndexVec},
-    surface::Gap,
+    surface::{Gap, WallSide},
 };
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 use std::{
     collections::{BTreeMap, BTreeSet},
     ops::ControlFlow,
 };
 
-/// A two-layer foam.
+/// A foam of free topology.
 #[derive(Clone, Debug)]
-pub struct Layers {
+pub struct FreeFoam {
     /// Cells, corners and polygons at the end; corners where they ended.
     pub division: Division,
     /// The films where they ended.
-    pub films: LayerFilms,
-    /// The energy of the plane films that the descent started from: of power cells, with slivers opened where topology may
-    /// change.
+    pub films: FreeFilms,
+    /// Their elements on each half side, as in [`FreeSettings::fineness`]; 0 for the coarsest.
+    pub fineness: usize,
+    /// The energy of the films that the descent started from: plane ones of power cells, with slivers opened where topology
+    /// may change, or those of the network.
     pub first_energy: f64,
     /// The energy at the end.
     pub energy: f64,
@@ -45,13 +50,15 @@ pub struct Layers {
     pub flips: usize,
     /// Borders that are shorter than a twentieth of the spacing although the descent has not converged, and their lengths.
     pub vanishing: Vec<(Side, f64)>,
-    /// Cells that were squeezed off their own wall, where the descent ended: there is no foam nearby in which all keep theirs.
-    pub leaving: Vec<usize>,
+    /// The laws that the last change of topology would have broken; it was not made.
+    pub unlawful: Vec<Unlawful>,
+    /// Cells that were squeezed off a wall of theirs, where the descent ended: there is no foam nearby in which all keep theirs.
+    pub leaving: Vec<(usize, WallSide)>,
 }
 
-/// How a two-layer foam is relaxed.
+/// How a foam of free topology is relaxed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LayerSettings {
+pub struct FreeSettings {
     /// Elements on each half side of a film.
     pub fineness: usize,
     /// The size of a cell: the unit of forces and of the lengths at which topology changes.
@@ -65,13 +72,17 @@ pub struct LayerSettings {
     pub changes_topology: bool,
 }
 
-impl LayerSettings {
-    /// The coarsest films, to a force of 1e-10; only annealed layers, which are no arrangement that has a name, change their
-    /// topology.
+impl FreeSettings {
+    /// Those for going on from a network's foam.
     #[must_use]
-    pub fn new(arrangement: Arrangement, spacing: f64) -> Self {
-        let changes_topology = arrangement == Arrangement::Annealed;
-        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600, changes_topology }
+    pub fn of(state: &State) -> Self {
+        Self::new(spacing(state.cell_width().powi(2), 1))
+    }
+
+    /// The coarsest films, to a force of 1e-10, with changes of topology.
+    #[must_use]
+    pub const fn new(spacing: f64) -> Self {
+        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600, changes_topology: true }
     }
 }
 
@@ -100,7 +111,7 @@ const MOST_SPREADS: usize = 12;
 const WEARINESS: f64 = 0.6;
 
 /// The coarsest films.
-const FIRST_FINENESS: usize = 0;
+pub(super) const FIRST_FINENESS: usize = 0;
 /// The force at which the first descent, on the coarsest films, ends: topology has settled by then.
 const FIRST_TOLERANCE: f64 = 1e-3;
 
@@ -108,30 +119,55 @@ const FIRST_TOLERANCE: f64 = 1e-3;
 /// happen, then on those that were asked for.
 ///
 /// # Errors
-/// [`NoLayers::Factor`] if the system cannot be solved at all.
+/// [`FactorError`] if the system cannot be solved at all.
 pub fn relaxed(
     division: Division,
     gap: &Gap,
-    settings: &LayerSettings,
+    settings: &FreeSettings,
     progress: &mut dyn FnMut(&DescentStep<'_>) -> ControlFlow<()>,
-) -> Result<Layers, NoLayers> {
+) -> Result<FreeFoam, FactorError> {
     let mut division = division;
     if settings.changes_topology {
         open(&mut division, gap, SLIVER * settings.spacing);
     }
-    let films = layer_films(&division, gap, FIRST_FINENESS);
+    let films = free_films(&division, gap, FIRST_FINENESS);
+    let pressures = IndexVec::from_elem(0.0, division.seeds.len());
+    let begin = Begin { division, films, fineness: FIRST_FINENESS, pressures };
+    relaxed_from(begin, gap, settings, progress)
+}
+
+/// Where a descent begins.
+pub(super) struct Begin {
+    pub(super) division: Division,
+    /// The fineness of its films.
+    pub(super) fineness: usize,
+    pub(super) films: FreeFilms,
+    pub(super) pressures: IndexVec<RegionId, f64>,
+}
+
+/// Goes on from films that lie near balance.
+///
+/// # Errors
+/// As [`relaxed`].
+pub(super) fn relaxed_from(
+    begin: Begin,
+    gap: &Gap,
+    settings: &FreeSettings,
+    progress: &mut dyn FnMut(&DescentStep<'_>) -> ControlFlow<()>,
+) -> Result<FreeFoam, FactorError> {
+    let Begin { division, films, fineness, mut pressures } = begin;
     let first_energy = energy(&films.complex, &films.places);
     let mut run = Run {
         gap,
         settings,
-        fineness: FIRST_FINENESS,
+        fineness,
         division,
         films,
         weary: BTreeMap::new(),
+        unlawful: Vec::new(),
         flips: 0,
         spreads: 0,
     };
-    let mut pressures = IndexVec::from_elem(0.0, run.division.seeds.len());
     let mut steps = 0;
     loop {
         let mut descent = run.descent(pressures)?;
@@ -157,13 +193,14 @@ pub fn relaxed(
 /// A foam on its way.
 struct Run<'a> {
     gap: &'a Gap,
-    settings: &'a LayerSettings,
+    settings: &'a FreeSettings,
     /// That of the present films.
     fineness: usize,
     division: Division,
-    films: LayerFilms,
+    films: FreeFilms,
     /// How often bodies have changed neighbours.
     weary: BTreeMap<Cluster, u32>,
+    unlawful: Vec<Unlawful>,
     flips: usize,
     /// How often films were laid anew.
     spreads: usize,
@@ -177,8 +214,8 @@ struct Vanishing {
     small: f64,
     /// Whether steps are held up although nothing vanishes.
     stuck: bool,
-    /// Cells that are squeezed off their wall.
-    leaving: Vec<usize>,
+    /// Cells that are squeezed off a wall.
+    leaving: Vec<(usize, WallSide)>,
 }
 
 impl Vanishing {
@@ -194,11 +231,9 @@ const MOST_FLIPS: usize = 10;
 type Lengths = BTreeMap<Side, f64>;
 
 impl Run<'_> {
-    fn descent(&self, pressures: IndexVec<RegionId, f64>) -> Result<Descent, NoLayers> {
-        let Division { seeds, volumes, .. } = &self.division;
-        let wanted = (0..seeds.len()).map(|cell| volumes[usize::from(!self.division.is_lower(cell))]);
-        let wanted = wanted.collect();
-        Ok(Descent::new(self.films.complex.clone(), wanted, self.films.places.clone(), pressures)?)
+    fn descent(&self, pressures: IndexVec<RegionId, f64>) -> Result<Descent, FactorError> {
+        let wanted = self.division.volumes.clone().into();
+        Descent::new(self.films.complex.clone(), wanted, self.films.places.clone(), pressures)
     }
 
     /// Descends until the end or until borders vanish that can; these are given, the shortest first.
@@ -207,8 +242,8 @@ impl Run<'_> {
         descent: &mut Descent,
         step_limit: usize,
         progress: &mut dyn FnMut(&DescentStep<'_>) -> ControlFlow<()>,
-    ) -> Result<(Descended, Vanishing), NoLayers> {
-        let LayerSettings { spacing, tolerance, .. } = *self.settings;
+    ) -> Result<(Descended, Vanishing), FactorError> {
+        let FreeSettings { spacing, tolerance, .. } = *self.settings;
         let tolerance = if self.fineness < self.settings.fineness { FIRST_TOLERANCE } else { tolerance };
         let settings = DescentSettings { length: spacing, tolerance, volume_tolerance: 1e-11, step_limit };
         let mut before = self.lengths(descent);
@@ -230,11 +265,16 @@ impl Run<'_> {
     fn lengths(&self, descent: &Descent) -> Lengths {
         let place = |image: &NodeImage| descent.complex().place(descent.places(), *image);
         let sides = self.films.borders.iter().chain(&self.films.wall_edges);
-        sides
-            .map(|(&side, nodes)| {
-                (side, nodes.windows(2).map(|pair| place(&pair[0]).distance(place(&pair[1]))).sum())
-            })
-            .collect()
+        let lengths = sides.map(|(&side, nodes)| {
+            (side, nodes.windows(2).map(|pair| place(&pair[0]).distance(place(&pair[1]))).sum())
+        });
+        // Lines without a film count by their chords.
+        let image = |corner, shift| NodeImage { node: NodeId::from_index(corner), shift };
+        let cut = self.division.cut_lines().map(|(a, b, shift)| {
+            let ends = [image(a, IVec3::ZERO), image(b, IVec3::from_array(shift))];
+            ((a, b, shift), place(&ends[0]).distance(place(&ends[1])))
+        });
+        lengths.chain(cut).collect()
     }
 
     /// Sides that are short, grow shorter and can change the topology.
@@ -270,20 +310,24 @@ impl Run<'_> {
         Vanishing { sides, small, ..Vanishing::default() }
     }
 
-    /// Cells whose patch on their own wall has shrunk to next to nothing.
-    fn leaving(&self, now: &Lengths) -> Vec<usize> {
-        let mut rims = vec![0.0; self.division.seeds.len()];
+    /// Cells whose patch on a wall of theirs has shrunk to next to nothing.
+    fn leaving(&self, now: &Lengths) -> Vec<(usize, WallSide)> {
+        let mut rims = vec![[0.0; 2]; self.division.seeds.len()];
         for polygon in &self.division.polygons {
             let count = polygon.corners.len();
-            for (at, _) in self.division.wall_sides(polygon) {
+            for (at, wall) in self.division.wall_sides(polygon) {
                 let (side, _) = side_between(polygon.corners[at], polygon.corners[(at + 1) % count]);
                 let length = now.get(&side).copied().unwrap_or(f64::INFINITY);
-                rims[polygon.cell] += length;
-                rims[polygon.neighbour] += length;
+                rims[polygon.cell][wall as usize] += length;
+                rims[polygon.neighbour][wall as usize] += length;
             }
         }
-        let gone = |cell: &usize| rims[*cell] < SQUEEZED_OFF * self.settings.spacing;
-        (0..rims.len()).filter(gone).collect()
+        let gone = |&(cell, wall): &(usize, WallSide)| {
+            self.division.stacking.walls(cell)[wall as usize]
+                && rims[cell][wall as usize] < SQUEEZED_OFF * self.settings.spacing
+        };
+        let patches = (0..rims.len()).flat_map(|cell| WallSide::BOTH.map(|wall| (cell, wall)));
+        patches.filter(gone).collect()
     }
 
     /// Takes over where a descent has brought the nodes.
@@ -319,6 +363,10 @@ impl Run<'_> {
         }
         if done > 0 {
             let (division, renumbering) = moves.finish();
+            self.unlawful = unlawful(&division);
+            if !self.unlawful.is_empty() {
+                return false;
+            }
             self.films = films_after(&division, self.gap, self.fineness, &self.films, &renumbering);
             self.division = division;
             self.flips += done;
@@ -336,7 +384,7 @@ impl Run<'_> {
         self.films = if self.spreads.is_multiple_of(2) {
             films_refined(&self.division, self.gap, self.fineness, &self.films)
         } else {
-            layer_films(&self.division, self.gap, self.fineness)
+            free_films(&self.division, self.gap, self.fineness)
         };
         self.spreads <= MOST_SPREADS
     }
@@ -351,14 +399,20 @@ impl Run<'_> {
         coarser
     }
 
-    fn end(self, descent: &Descent, descended: Descended, first_energy: f64, leaving: Vec<usize>) -> Layers {
+    fn end(
+        self,
+        descent: &Descent,
+        descended: Descended,
+        first_energy: f64,
+        leaving: Vec<(usize, WallSide)>,
+    ) -> FreeFoam {
         let vanishing = if descended.ending == Ending::Converged {
             Vec::new()
         } else {
             let lengths = self.lengths(descent);
             lengths.into_iter().filter(|(_, length)| *length < VANISHING * self.settings.spacing).collect()
         };
-        Layers {
+        FreeFoam {
             first_energy,
             energy: descent.energy(),
             pressures: descent.pressures().clone(),
@@ -369,11 +423,13 @@ impl Run<'_> {
             leaving,
             division: self.division,
             films: self.films,
+            unlawful: self.unlawful,
+            fineness: self.fineness,
         }
     }
 }
 
-impl Layers {
+impl FreeFoam {
     /// The place of a node.
     #[must_use]
     pub fn place(&self, image: NodeImage) -> DVec3 {
@@ -386,14 +442,22 @@ impl Layers {
         &self.films.places
     }
 
-    /// The relative spread of the volumes round their layer's mean.
+    /// The lowest eigenvalue of the Hessian at constant volumes of a foam in balance; see [`crate::foam::solve::Mode`].
+    ///
+    /// # Errors
+    /// [`FactorError`] if the system cannot be factored.
+    pub fn lowest_eigenvalue(&self) -> Result<f64, FactorError> {
+        let wanted = self.division.volumes.clone().into();
+        let (complex, places) = (self.films.complex.clone(), self.films.places.clone());
+        Ok(Descent::new(complex, wanted, places, self.pressures.clone())?.lowest_mode()?.eigenvalue)
+    }
+
+    /// The relative spread of the volumes round those that the cells shall have.
     #[must_use]
     pub fn volume_spread(&self) -> f64 {
-        let (lower, upper) = self.volumes.as_slice().split_at(self.division.lower);
-        let squares = |layer: &[f64]| {
-            let mean = layer.iter().sum::<f64>() / as_f64(layer.len());
-            layer.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>()
-        };
-        ((squares(lower) + squares(upper)) / as_f64(self.volumes.len())).sqrt()
+        let wanted = &self.division.volumes;
+        let scale = self.volumes.iter().sum::<f64>() / wanted.iter().sum::<f64>();
+        let squares = self.volumes.iter().zip(wanted).map(|(v, w)| (v / (scale * w) - 1.0).powi(2));
+        (squares.sum::<f64>() / as_f64(self.volumes.len())).sqrt()
     }
 }

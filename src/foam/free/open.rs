@@ -68,12 +68,9 @@ fn raise(division: &mut Division, gap: &Gap, top: CornerImage, base: [CornerImag
 }
 
 fn push_corner(division: &mut Division, gap: &Gap, image: CornerImage, by: DVec3) {
-    let corner = &mut division.corners[image.corner];
-    let place = corner.place + by;
-    corner.place = match corner.wall {
-        Some(side) => gap.wall(side).project(place).unwrap_or(corner.place),
-        None => place,
-    };
+    let corner = division.corners[image.corner];
+    let place = division.retracted(gap, corner.wall, corner.plane, corner.place + by);
+    division.corners[image.corner].place = place;
 }
 
 /// All borders and edges on walls, with the number of their films.
@@ -92,7 +89,7 @@ pub(super) fn sides(division: &Division) -> BTreeMap<Side, usize> {
 mod tests {
     use super::*;
     use crate::foam::{
-        layers::{Arrangement, sheets},
+        layers::{Arrangement, divided, sheets},
         setup::{FoamSpace, SpaceError},
     };
     use std::ops::ControlFlow;
@@ -103,7 +100,7 @@ mod tests {
         let (gap, domain) = (space.gap()?, space.domain()?);
         let goes_on = &mut |_| ControlFlow::Continue(());
         let sown = sheets(&space, &gap, Arrangement::Annealed, 24, 1, goes_on).unwrap();
-        let mut division = Division::new(&gap, &domain, &sown).unwrap();
+        let mut division = divided(&gap, &domain, &sown).unwrap();
         let shortest = |division: &Division| {
             let length = |&(first, second, shift): &Side| {
                 let end = CornerImage { corner: second, shift };

@@ -1,7 +1,7 @@
 //! The two moves: where their new corners stand, and what the films round them become.
 
-use super::{Body, Moves, moved, wall_of};
-use crate::foam::layers::division::{CornerImage, Polygon};
+use super::{Body, Moves, plane_of, wall_of};
+use crate::foam::free::division::{CornerImage, Polygon, moved};
 use glam::{DVec3, IVec3};
 use std::collections::{BTreeMap, BTreeSet, btree_map::Entry};
 
@@ -28,6 +28,13 @@ impl Moves<'_> {
     /// Whether a film or a place on a wall may come to be between two bodies: not a second one, none between walls, and none
     /// through which a cell would reach the wall of the other layer or a layer lose its own.
     fn may_touch(&self, u: Body, v: Body) -> bool {
+        if let (Body::Cell(cell, _), Body::Plane(_)) | (Body::Plane(_), Body::Cell(cell, _)) = (u, v) {
+            // A cell that ends at a plane already would do so in two places.
+            return self
+                .corners_of(cell)
+                .iter()
+                .all(|image| self.division.corners[image.corner].plane.is_none());
+        }
         let (Body::Cell(cell, at), Body::Cell(other, there)) = (u, v) else { return false };
         let apart = IVec3::from_array(there) - IVec3::from_array(at);
         (cell, [0; 3]) != (other, apart.to_array())
@@ -73,14 +80,17 @@ impl Moves<'_> {
         Some(Rewrite { new: new.collect(), old: vec![first, second] })
     }
 
-    pub(super) fn film_to_border(&self, polygon: usize, back: IVec3, small: f64) -> Option<Rewrite> {
-        let corners: Vec<CornerImage> =
-            self.division.polygons[polygon].corners.iter().map(|&image| moved(image, back)).collect();
+    /// What a triangle between two bodies becomes when it shrinks to nothing, a film or what a cell covers of a plane.
+    pub(super) fn film_to_border(
+        &self,
+        corners: Vec<CornerImage>,
+        [u, v]: [Body; 2],
+        small: f64,
+    ) -> Option<Rewrite> {
         let places: Vec<DVec3> = corners.iter().map(|&image| self.division.place(image)).collect();
         if (0..3).any(|i| places[i].distance(places[(i + 1) % 3]) > small) {
             return None;
         }
-        let [u, v] = self.sides(polygon, back);
         let bodies: Vec<BTreeSet<Body>> = corners.iter().map(|&image| self.bodies(image)).collect();
         let all: BTreeSet<Body> = bodies.iter().flatten().copied().collect();
         if all.len() != 5 || bodies.iter().any(|at| at.len() != 4) {
@@ -108,10 +118,7 @@ impl Moves<'_> {
     }
 
     fn on_walls(&self, bodies: &BTreeSet<Body>, place: DVec3) -> DVec3 {
-        match wall_of(bodies) {
-            Some(side) => self.gap.wall(side).project(place).unwrap_or(place),
-            None => place,
-        }
+        self.division.retracted(self.gap, wall_of(bodies), plane_of(bodies), place)
     }
 
     /// What a move makes of the films round it; nothing if one would be left with two corners.
@@ -187,6 +194,10 @@ impl Moves<'_> {
         }
         let in_all = |body: &&Body| rewrite.new.iter().all(|(bodies, _)| bodies.contains(body));
         let common: Vec<Body> = rewrite.new[0].0.iter().filter(in_all).copied().collect();
+        if let [Body::Cell(..), Body::Plane(_)] = common[..] {
+            // The cell comes to the plane, on which it has no film.
+            return Some(None);
+        }
         let [Body::Cell(cell, at), Body::Cell(neighbour, there)] = common[..] else { return None };
         // A film beside the new one, with the cell on one side, runs along their border the other way.
         let beside = replaced.iter().find_map(|(&polygon, corners)| {

@@ -11,7 +11,7 @@
 mod rewrite;
 
 use super::{
-    division::{Corner, CornerImage, Division},
+    division::{Corner, CornerImage, Division, moved},
     films::Side,
 };
 use crate::surface::{Gap, WallSide};
@@ -26,13 +26,15 @@ pub(super) enum Body {
     Cell(usize, [i32; 3]),
     /// A wall.
     Wall(WallSide),
+    /// A plane that cuts the gap off.
+    Plane(usize),
 }
 
 impl Body {
     fn moved(self, by: IVec3) -> Self {
         match self {
             Self::Cell(cell, shift) => Self::Cell(cell, (IVec3::from_array(shift) + by).to_array()),
-            Self::Wall(_) => self,
+            Self::Wall(_) | Self::Plane(_) => self,
         }
     }
 }
@@ -121,8 +123,8 @@ impl<'a> Moves<'a> {
     fn bodies(&self, image: CornerImage) -> BTreeSet<Body> {
         let shift = IVec3::from_array(image.shift);
         let cells = self.seen(image.corner).flat_map(|seen| self.sides(seen.polygon, seen.back + shift));
-        let wall = self.division.corners[image.corner].wall.map(Body::Wall);
-        cells.chain(wall).collect()
+        let Corner { wall, plane, .. } = self.division.corners[image.corner];
+        cells.chain(wall.map(Body::Wall)).chain(plane.map(Body::Plane)).collect()
     }
 
     /// The corners at the other ends of the borders of a corner's image, by the three bodies of each border.
@@ -138,7 +140,62 @@ impl<'a> Moves<'a> {
                 borders.insert(shared, other);
             }
         }
+        for (shared, other) in self.cut_lines(image, &own) {
+            borders.insert(shared, other);
+        }
         borders
+    }
+
+    /// The lines without a film that start at a corner on a wall and a plane: one for each of its two cells, with the other
+    /// end.
+    fn cut_lines(&self, image: CornerImage, own: &BTreeSet<Body>) -> Vec<(Vec<Body>, CornerImage)> {
+        let Corner { wall: Some(wall), plane: Some(plane), .. } = self.division.corners[image.corner] else {
+            return Vec::new();
+        };
+        let of_cell = |&body: &Body| {
+            let Body::Cell(cell, shift) = body else { return None };
+            let frame = IVec3::from_array(shift);
+            let other = self.corners_of(cell).into_iter().map(|other| moved(other, frame)).find(|other| {
+                let corner = self.division.corners[other.corner];
+                *other != image && corner.wall == Some(wall) && corner.plane.is_some()
+            })?;
+            Some((vec![body, Body::Wall(wall), Body::Plane(plane)], other))
+        };
+        own.iter().filter_map(of_cell).collect()
+    }
+
+    /// All corners of a cell, in its frame.
+    fn corners_of(&self, cell: usize) -> BTreeSet<CornerImage> {
+        let alive =
+            self.division.polygons.iter().enumerate().filter(|(id, _)| !self.dead_polygons.contains(id));
+        alive
+            .flat_map(|(_, film)| {
+                let here = (film.cell == cell).then_some(IVec3::ZERO);
+                let beyond = (film.neighbour == cell).then_some(-film.shift);
+                here.into_iter()
+                    .chain(beyond)
+                    .flat_map(|by| film.corners.iter().map(move |&image| moved(image, by)))
+            })
+            .collect()
+    }
+
+    /// Triangles that cells cover of a plane, with two corners of a side among theirs: their corners, the plane and the cell.
+    fn cut_triangles(&self, first: CornerImage, second: CornerImage) -> Vec<(Vec<CornerImage>, [Body; 2])> {
+        let Some(plane) = self.division.corners[first.corner].plane else { return Vec::new() };
+        let shared: Vec<Body> = self.bodies(first).intersection(&self.bodies(second)).copied().collect();
+        let triangle = |&body: &Body| {
+            let Body::Cell(cell, shift) = body else { return None };
+            let on_plane = |image: &CornerImage| self.division.corners[image.corner].plane == Some(plane);
+            let corners: Vec<CornerImage> = self
+                .corners_of(cell)
+                .into_iter()
+                .filter(on_plane)
+                .map(|image| moved(image, IVec3::from_array(shift)))
+                .collect();
+            let whole = corners.len() == 3 && corners.contains(&first) && corners.contains(&second);
+            whole.then_some((corners, [Body::Plane(plane), body]))
+        };
+        shared.iter().filter_map(triangle).collect()
     }
 
     /// The bodies that meet along a border or an edge on a wall and at its two ends; nothing where more than four bodies meet
@@ -181,8 +238,13 @@ impl<'a> Moves<'a> {
                 let has_second = polygon.corners.iter().any(|&image| moved(image, seen.back) == second);
                 polygon.corners.len() == 3 && has_second
             });
-            let mut rewrites =
-                triangles.filter_map(|seen| self.film_to_border(seen.polygon, seen.back, small));
+            let films = triangles.map(|seen| {
+                let corners = self.division.polygons[seen.polygon].corners.iter();
+                let corners: Vec<CornerImage> = corners.map(|&image| moved(image, seen.back)).collect();
+                (corners, self.sides(seen.polygon, seen.back))
+            });
+            let all = films.chain(self.cut_triangles(first, second));
+            let mut rewrites = all.filter_map(|(corners, sides)| self.film_to_border(corners, sides, small));
             rewrites.find_map(|rewrite| {
                 let rewritten = self.rewritten(&rewrite)?;
                 Some((rewrite, rewritten))
@@ -193,7 +255,8 @@ impl<'a> Moves<'a> {
     fn carry_out(&mut self, rewrite: &Rewrite, rewritten: Rewritten) {
         self.dead_corners.extend(rewrite.old.iter().map(|image| image.corner));
         for (bodies, place) in &rewrite.new {
-            self.division.corners.push(Corner { place: *place, wall: wall_of(bodies) });
+            let (wall, plane) = (wall_of(bodies), plane_of(bodies));
+            self.division.corners.push(Corner { place: *place, wall, plane });
             self.films.push(Vec::new());
         }
         for (polygon, corners) in rewritten.films {
@@ -248,21 +311,24 @@ impl<'a> Moves<'a> {
     }
 }
 
-fn moved(image: CornerImage, by: IVec3) -> CornerImage {
-    CornerImage { corner: image.corner, shift: (IVec3::from_array(image.shift) + by).to_array() }
-}
-
 fn wall_of(bodies: &BTreeSet<Body>) -> Option<WallSide> {
     bodies.iter().find_map(|body| match body {
         Body::Wall(side) => Some(*side),
-        Body::Cell(..) => None,
+        Body::Cell(..) | Body::Plane(_) => None,
+    })
+}
+
+fn plane_of(bodies: &BTreeSet<Body>) -> Option<usize> {
+    bodies.iter().find_map(|body| match body {
+        Body::Plane(plane) => Some(*plane),
+        Body::Cell(..) | Body::Wall(_) => None,
     })
 }
 
 fn without_images(bodies: BTreeSet<Body>) -> Cluster {
     let bare = bodies.into_iter().map(|body| match body {
         Body::Cell(cell, _) => Body::Cell(cell, [0; 3]),
-        Body::Wall(_) => body,
+        Body::Wall(_) | Body::Plane(_) => body,
     });
     let mut bare: Cluster = bare.collect();
     bare.sort();

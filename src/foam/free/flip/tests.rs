@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::foam::{
-    layers::{Arrangement, open::sides, sheets},
+    free::open::sides,
+    layers::{Arrangement, divided, sheets},
     setup::{FoamSpace, SpaceError},
 };
 use std::ops::ControlFlow;
@@ -14,7 +15,7 @@ fn annealed() -> Result<(Division, Gap, f64), SpaceError> {
     let sown =
         sheets(&SPACE, &gap, Arrangement::Annealed, 16, 3, &mut |_| ControlFlow::Continue(())).unwrap();
     let domain = SPACE.domain()?;
-    let division = Division::new(&gap, &domain, &sown).unwrap();
+    let division = divided(&gap, &domain, &sown).unwrap();
     Ok((division, gap, sown.spacing))
 }
 
@@ -77,6 +78,6 @@ fn four_bodies_meet_at_every_corner_even_of_one_that_lies_near_a_wall() -> Resul
     let (gap, domain) = (space.gap()?, space.domain()?);
     let sown =
         sheets(&space, &gap, Arrangement::Annealed, 105, 1, &mut |_| ControlFlow::Continue(())).unwrap();
-    assert_lawful(&Division::new(&gap, &domain, &sown).unwrap(), &gap);
+    assert_lawful(&divided(&gap, &domain, &sown).unwrap(), &gap);
     Ok(())
 }

@@ -1,0 +1,286 @@
+//! Walls moved apart in stages, with changes of topology on the way.
+//!
+//! Each stage starts from the balance of the one before: every node goes along the normals of the level sets, at its part of
+//! the way from wall to wall, so that walls stay walls and films stay between them. Where a film's edge on one wall vanishes,
+//! cells change neighbours on that wall only, and a film grows from there down to a corner inside the gap.
+
+use super::{
+    Division, FreeFilms, FreeFoam, FreeSettings, Unlawful,
+    division::CornerImage,
+    extruded::taken_over,
+    films::films_refined,
+    relax::{Begin, FIRST_FINENESS, relaxed_from},
+};
+use crate::{
+    foam::{
+        relax::{DescentStep, Ending, State},
+        solve::FactorError,
+    },
+    surface::{Gap, LevelSet, WallSide},
+};
+use glam::DVec3;
+use std::ops::ControlFlow;
+
+/// What is in the way of wider walls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Obstacle {
+    /// A change of topology would break a law.
+    Law(Unlawful),
+    /// What a cell covers of a wall shrinks to nothing.
+    Leaves {
+        /// The cell.
+        cell: usize,
+        /// The wall.
+        wall: WallSide,
+        /// Where.
+        place: DVec3,
+    },
+    /// A border vanishes and no change of topology is possible there.
+    Border {
+        /// The cells at it.
+        cells: [usize; 2],
+        /// Its length, in cell spacings.
+        length: f64,
+        /// Where.
+        place: DVec3,
+    },
+    /// A film has slid round a corner between two planes that cut the gap off.
+    Slid {
+        /// Cells at it.
+        cells: [usize; 2],
+        /// Where.
+        place: DVec3,
+    },
+    /// Newton steps do not come to a balance.
+    Unsettled {
+        /// The largest force left, in units of tension × spacing.
+        force: f64,
+    },
+    /// The caller asked to stop.
+    Interrupted,
+}
+
+/// A foam between walls that were moved apart.
+#[derive(Clone, Debug)]
+pub struct Widened {
+    /// The foam, in the part of the gap that was reached.
+    pub foam: FreeFoam,
+    /// That part: the walls' levels are multiplied by it.
+    pub part: f64,
+    /// What is in the way of the whole gap; none if it was reached.
+    pub obstacle: Option<Obstacle>,
+    /// Newton steps and changes of topology in all stages.
+    pub steps: usize,
+    /// Changes of topology in all stages.
+    pub flips: usize,
+}
+
+/// What is told after each step.
+#[derive(Clone, Copy, Debug)]
+pub struct WideningStep<'a> {
+    /// The part of the gap.
+    pub part: f64,
+    /// Changes of topology before this stage.
+    pub flips: usize,
+    /// The step.
+    pub step: &'a DescentStep<'a>,
+}
+
+/// The walls' distance grows by this factor from stage to stage at first; half as much in the logarithm after each stage that
+/// failed, and again by more after each that settled.
+const GROWTH: f64 = 1.1;
+/// A stage that widens by less is not tried.
+const LEAST_GROWTH: f64 = 1.02;
+/// Newton steps of a stage on the coarsest films: those that settle take three to a hundred.
+const STAGE_STEPS: usize = 150;
+/// Steps of which less than this part could be taken are held up; after so many of them a stage is given up.
+const HELD_UP: f64 = 0.05;
+const MOST_HELD_UP: usize = 20;
+/// The fineness of stages that do not settle on the coarsest films.
+const MOST_COARSE: usize = 1;
+/// The force at which a stage ends: topology has settled by then.
+const STAGE_TOLERANCE: f64 = 1e-3;
+/// A film's end that lies beyond a plane by more than this part of the spacing has slid round a corner.
+const SLID: f64 = 0.01;
+
+/// Goes on from a network's foam in a part of `gap` until it is filled.
+///
+/// # Errors
+/// [`FactorError`] if Newton's system cannot be solved in the part that the network fills.
+pub fn widened(
+    state: &State,
+    gap: &Gap,
+    settings: &FreeSettings,
+    progress: &mut dyn FnMut(&WideningStep<'_>) -> ControlFlow<()>,
+) -> Result<Widened, FactorError> {
+    let narrow = gap.narrowed(state.part);
+    let (division, films) = taken_over(state, &narrow, FIRST_FINENESS);
+    let begin = Begin { division, films, fineness: FIRST_FINENESS, pressures: state.pressures.clone() };
+    let mut stages = Stages { gap, settings, steps: 0, flips: 0, progress };
+    let (mut foam, mut obstacle) = stages.coarse(begin, state.part)?;
+    stages.flips += foam.flips;
+    let (mut part, mut growth, mut fineness) = (state.part, GROWTH, FIRST_FINENESS);
+    while part < 1.0 && obstacle != Some(Obstacle::Interrupted) {
+        if growth < LEAST_GROWTH {
+            if fineness >= MOST_COARSE {
+                break;
+            }
+            // Long and thin films fold on the coarsest elements first.
+            (fineness, growth) = (MOST_COARSE, GROWTH);
+        }
+        let wider = (part * growth).min(1.0);
+        let tried = moved_apart(&foam, &gap.narrowed(part), &gap.narrowed(wider))
+            .map(|begin| refined(begin, &gap.narrowed(wider), fineness))
+            .and_then(|begin| stages.coarse(begin, wider).ok());
+        match tried {
+            Some((settled, None)) => {
+                stages.flips += settled.flips;
+                growth = (growth * growth).min(GROWTH);
+                (foam, part, obstacle) = (settled, wider, None);
+            }
+            Some((_, found)) => (obstacle, growth) = (found, growth.sqrt()),
+            None => growth = growth.sqrt(),
+        }
+    }
+    let begin = Begin {
+        fineness: foam.fineness,
+        division: foam.division,
+        films: foam.films,
+        pressures: foam.pressures,
+    };
+    let foam = stages.relaxed(begin, part, settings)?.0;
+    let flips = stages.flips + foam.flips;
+    if part >= 1.0 || obstacle.is_none() {
+        obstacle = self::obstacle(&foam, settings.spacing);
+    }
+    Ok(Widened { foam, part, obstacle, steps: stages.steps, flips })
+}
+
+/// Stages on their way.
+struct Stages<'a> {
+    gap: &'a Gap,
+    settings: &'a FreeSettings,
+    steps: usize,
+    flips: usize,
+    progress: &'a mut dyn FnMut(&WideningStep<'_>) -> ControlFlow<()>,
+}
+
+impl Stages<'_> {
+    /// A foam in a part of the gap to the stages' tolerance, on films as fine as they are, and what is in its way.
+    fn coarse(&mut self, begin: Begin, part: f64) -> Result<(FreeFoam, Option<Obstacle>), FactorError> {
+        let settings = FreeSettings {
+            fineness: begin.fineness,
+            tolerance: STAGE_TOLERANCE,
+            step_limit: STAGE_STEPS,
+            ..*self.settings
+        };
+        let (foam, held_up) = self.relaxed(begin, part, &settings)?;
+        let force = foam.descended.residuals.force;
+        let obstacle = obstacle(&foam, settings.spacing).map(|found| match found {
+            Obstacle::Interrupted if held_up => Obstacle::Unsettled { force },
+            other => other,
+        });
+        Ok((foam, obstacle))
+    }
+
+    /// A foam in a part of the gap, and whether it was given up because its steps were held up.
+    fn relaxed(
+        &mut self,
+        begin: Begin,
+        part: f64,
+        settings: &FreeSettings,
+    ) -> Result<(FreeFoam, bool), FactorError> {
+        let Self { gap, flips, progress, .. } = self;
+        let is_stage = settings.step_limit == STAGE_STEPS;
+        let mut held_up = 0;
+        let foam = relaxed_from(begin, &gap.narrowed(part), settings, &mut |step| {
+            held_up += usize::from(step.fraction < HELD_UP);
+            match progress(&WideningStep { part, flips: *flips, step }) {
+                ControlFlow::Continue(()) if is_stage && held_up > MOST_HELD_UP => ControlFlow::Break(()),
+                flow => flow,
+            }
+        })?;
+        self.steps += foam.descended.steps;
+        Ok((foam, held_up > MOST_HELD_UP))
+    }
+}
+
+/// The same foam on films of another fineness, if that is another.
+fn refined(begin: Begin, gap: &Gap, fineness: usize) -> Begin {
+    if begin.fineness == fineness {
+        return begin;
+    }
+    let films = films_refined(&begin.division, gap, fineness, &begin.films);
+    Begin { films, fineness, ..begin }
+}
+
+/// The foam with its nodes at the same part of the way between other walls; `None` if a node finds no place.
+fn moved_apart(foam: &FreeFoam, from: &Gap, to: &Gap) -> Option<Begin> {
+    let walls = |gap: &Gap| gap.walls().each_ref().map(|wall| wall.level);
+    let ([low, high], [wider_low, wider_high]) = (walls(from), walls(to));
+    let field = &from.walls()[0].field;
+    let moved = |place: DVec3| {
+        let part = (field.value(place) - low) / (high - low);
+        field.project(place, wider_low + part * (wider_high - wider_low)).ok()
+    };
+    let (mut films, mut division): (FreeFilms, Division) = (foam.films.clone(), foam.division.clone());
+    for place in films.places.iter_mut() {
+        *place = moved(*place)?;
+    }
+    films.complex.walls = foam.division.walls(to).into();
+    for corner in &mut division.corners {
+        corner.place = moved(corner.place)?;
+    }
+    Some(Begin { division, films, fineness: foam.fineness, pressures: foam.pressures.clone() })
+}
+
+/// What keeps a foam from balance; nothing if it is in balance.
+fn obstacle(foam: &FreeFoam, spacing: f64) -> Option<Obstacle> {
+    if let Some(slid) = slid(&foam.division, spacing) {
+        return Some(slid);
+    }
+    match foam.descended.ending {
+        Ending::Converged => return None,
+        Ending::Halted if foam.vanishing.is_empty() && foam.leaving.is_empty() => {
+            return Some(Obstacle::Interrupted);
+        }
+        _ => {}
+    }
+    if let Some(&law) = foam.unlawful.first() {
+        return Some(Obstacle::Law(law));
+    }
+    if let Some(&(cell, wall)) = foam.leaving.first() {
+        let rim = &foam.division.rims(wall)[cell];
+        let place = rim.first().map_or(foam.division.seeds[cell], |edge| foam.division.place(edge.from));
+        return Some(Obstacle::Leaves { cell, wall, place });
+    }
+    let border = foam.vanishing.iter().min_by(|a, b| a.1.total_cmp(&b.1)).and_then(|&(side, length)| {
+        let [start, end] = [(side.0, [0; 3]), (side.1, side.2)]
+            .map(|(corner, shift)| foam.division.place(CornerImage { corner, shift }));
+        let at = |corner| move |image: &CornerImage| image.corner == corner;
+        let film = foam
+            .division
+            .polygons
+            .iter()
+            .find(|film| film.corners.iter().any(at(side.0)) && film.corners.iter().any(at(side.1)))?;
+        let (cells, place) = ([film.cell, film.neighbour], 0.5 * (start + end));
+        Some(Obstacle::Border { cells, length: length / spacing, place })
+    });
+    let force = foam.descended.residuals.force;
+    border.or(Some(Obstacle::Unsettled { force }))
+}
+
+/// A corner that lies on one plane and beyond another.
+fn slid(division: &Division, spacing: f64) -> Option<Obstacle> {
+    division.polygons.iter().find_map(|film| {
+        let beyond = |image: &&CornerImage| {
+            let corner = division.corners[image.corner];
+            let others = division.planes.iter().enumerate().filter(|(at, _)| Some(*at) != corner.plane);
+            corner.plane.is_some()
+                && others.map(|(_, plane)| plane.value(corner.place)).any(|v| v < -SLID * spacing)
+        };
+        let image = film.corners.iter().find(beyond)?;
+        let place = division.corners[image.corner].place;
+        Some(Obstacle::Slid { cells: [film.cell, film.neighbour], place })
+    })
+}
