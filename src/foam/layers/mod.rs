@@ -115,7 +115,7 @@ pub enum NoLayers {
     },
     /// More cells than can be relaxed.
     #[error(
-        "{cells} cells on each wall are too many: Newton's matrix for two layers takes minutes a step and more than ten gigabytes from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
+        "{cells} cells on each wall are too many: Newton's matrix for two layers takes half a minute a step and gigabytes of memory from {most} cells on; ask for at most so many, or for cells at least {width:.4} wide, in the surface's units"
     )]
     Many {
         /// Asked for.

@@ -324,7 +324,8 @@ mod tests {
             let cells = if matches!(space, FoamSpace::Plane { .. }) { 16 } else { 200 };
             let goes_on = &mut |_| ControlFlow::Continue(());
             let mut settled = sheets(&space, &gap, Arrangement::Annealed, cells, 5, goes_on).unwrap();
-            // Off the least energy, so that there are forces.
+            // Off the least energy, so that there are forces; and with many patches that are held as too small.
+            settled.patches = settled.patches.map(|patch| 2.5 * patch);
             for (at, (seed, weight)) in settled.seeds.iter_mut().zip(&mut settled.weights).enumerate() {
                 let by = as_f64(at * 7 % 11) / 11.0 - 0.5;
                 *seed += 0.1 * settled.spacing * by * DVec3::new(1.0, -0.5, 0.7);
