@@ -44,7 +44,9 @@ pub(super) fn foot(wall: &Wall, y: DVec3, direction: DVec3, guess: f64) -> (f64,
             (jet.value - wall.level, jet.gradient.dot(direction), bend.dot(direction));
         let step = -2.0 * value * slope / (2.0 * slope * slope - value * second);
         z += step;
-        if step.abs() * bend.length() <= LAST_STEP * slope.abs() {
+        let columns = [jet.hessian.x_axis, jet.hessian.y_axis, jet.hessian.z_axis];
+        let curvature = columns.map(DVec3::length_squared).iter().sum::<f64>().sqrt() * direction.length();
+        if step.abs() * curvature <= LAST_STEP * slope.abs() {
             return (z, Jet { value: wall.level, gradient: jet.gradient + step * bend, ..jet });
         }
         if !step.is_finite() {
