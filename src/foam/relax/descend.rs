@@ -32,6 +32,13 @@ pub struct DescentSettings {
     pub step_limit: usize,
 }
 
+impl DescentSettings {
+    /// The residuals in units of the tolerances: balance is where it is 1 or less.
+    fn size(&self, residuals: &Residuals) -> f64 {
+        (residuals.force / self.tolerance).max(residuals.volume / self.volume_tolerance)
+    }
+}
+
 /// How a descent ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
@@ -67,7 +74,8 @@ pub struct Descended {
     pub steps: usize,
     /// The residuals at the end, as in [`DescentStep`].
     pub residuals: Residuals,
-    /// Directions of negative curvature at the end: 0 at a minimum.
+    /// Directions of negative curvature at the end: 0 at a minimum. Where the last step was full and so short that they cannot
+    /// have changed, those before it.
     pub unstable: usize,
 }
 
@@ -244,17 +252,23 @@ impl Descent {
         let mut pushes = 0;
         let mut steps = 0;
         let mut measured = self.measured(&self.places);
+        let mut may_have_ended = false;
         loop {
             let now = &measured.volumes;
             let aims = self.aims(now);
             let excess = now.iter().zip(&aims).map(|(now, aim)| now - aim).collect();
             let volume = self.volume_residual(now);
+            if may_have_ended {
+                let residuals = self.residuals(&excess, volume, settings.length);
+                if settings.size(&residuals) <= 1.0 {
+                    return Ok(Descended { ending: Ending::Converged, steps, residuals, unstable: 0 });
+                }
+            }
             let step = self.step(&excess, volume > FAR)?;
             let residuals = Residuals { force: step.residuals.force / settings.length, volume };
             let unstable = step.unstable;
             let ended = |ending| Ok(Descended { ending, steps, residuals, unstable });
-            let size =
-                (residuals.force / settings.tolerance).max(residuals.volume / settings.volume_tolerance);
+            let size = settings.size(&residuals);
             if size <= 1.0 && unstable == 0 {
                 if self.damping <= 0.0 {
                     return ended(Ending::Converged);
@@ -272,6 +286,7 @@ impl Descent {
             if idle > IDLE_STEPS {
                 return ended(Ending::Stalled);
             }
+            let was_damped = self.damping > 0.0;
             let (fraction, taken) = if size <= 1.0 {
                 pushes += 1;
                 if pushes > MOST_PUSHES {
@@ -284,6 +299,12 @@ impl Descent {
             };
             measured = taken.unwrap_or_else(|| self.measured(&self.places));
             steps += 1;
+            // A full step from so near leaves forces of the order of their square, and no new direction of falling energy.
+            may_have_ended = fraction >= 1.0
+                && unstable == 0
+                && !was_damped
+                && residuals.force.max(residuals.volume) < TRUSTED
+                && residuals.force.powi(2) <= settings.tolerance;
             if observer(&DescentStep { descent: self, residuals, fraction, unstable }).is_break() {
                 return Ok(Descended { ending: Ending::Halted, steps, residuals, unstable });
             }
@@ -299,6 +320,13 @@ impl Descent {
         let Self { complex, places, reference, pressures, .. } = self;
         let demand = Demand { excess, damping: self.damping, balances };
         self.system.step_by(complex, places, reference, pressures, &demand)
+    }
+
+    /// How far from balance it is, without a step; `volume` is known.
+    fn residuals(&self, excess: &IndexVec<RegionId, f64>, volume: f64, length: f64) -> Residuals {
+        let Self { complex, places, reference, pressures, .. } = self;
+        let found = self.system.residuals(complex, places, reference, pressures, excess);
+        Residuals { force: found.force / length, volume }
     }
 
     /// The volumes that the next step aims at: the targets, or as far towards them as films bear in one step.

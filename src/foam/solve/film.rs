@@ -96,6 +96,16 @@ impl Scratch {
     pub(super) fn new() -> Self {
         Self { hessian: Blocks::zero(0), map: Vec::new(), moved: Vec::new() }
     }
+
+    /// Makes the maps of a film zero; gives their rows and columns.
+    fn restart(&mut self, layout: &FilmLayout) -> (usize, usize) {
+        let (rows, columns) = (3 * layout.nodes.len(), layout.freedoms.len() + layout.inner.len());
+        for memory in [&mut self.map, &mut self.moved] {
+            memory.clear();
+            memory.resize(rows * columns, 0.0);
+        }
+        (rows, columns)
+    }
 }
 
 /// Gradients by the places of the film's nodes: of the Lagrangian, and of minus the volumes of back and front.
@@ -105,8 +115,13 @@ struct NodeShares {
     front: Vec<DVec3>,
 }
 
-/// The gradients, and the Hessian into `hessian`.
-fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout, hessian: &mut Blocks) -> NodeShares {
+/// The gradients, and the Hessian into `hessian` if that is asked for.
+fn node_shares(
+    at: &At<'_>,
+    film: &Film,
+    layout: &FilmLayout,
+    mut hessian: Option<&mut Blocks>,
+) -> NodeShares {
     let count = layout.nodes.len();
     let base = at.complex.place(at.places, layout.nodes[0]);
     let [back, front] = at.reference.origins(at.complex, film).map(|origin| origin - base);
@@ -123,7 +138,9 @@ fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout, hessian: &mut Bloc
         back: vec![DVec3::ZERO; count],
         front: vec![DVec3::ZERO; count],
     };
-    hessian.restart(count);
+    if let Some(hessian) = hessian.as_deref_mut() {
+        hessian.restart(count);
+    }
     let mut absolute = Vec::with_capacity(9);
     let mut local = Vec::with_capacity(9);
     for (element, rows) in film.elements.iter().zip(&layout.rows) {
@@ -133,11 +150,11 @@ fn node_shares(at: &At<'_>, film: &Film, layout: &FilmLayout, hessian: &mut Bloc
         local.extend(absolute.iter().map(|&p| p - base));
         let NodeShares { lagrangian, back, front } = &mut shares;
         let targets = &mut [&mut lagrangian[..], &mut back[..], &mut front[..]];
-        add_element(element.shape, &local, rows, &all, targets, Some(&mut *hessian));
+        add_element(element.shape, &local, rows, &all, targets, hessian.as_deref_mut());
         for (wall, edge) in at.complex.wall_edges(element) {
             let strip = WallEdge::new(at.complex, at.reference, element, &absolute, wall, edge);
             let edge_rows: Vec<usize> = edge.iter().map(|&node| rows[node]).collect();
-            strip.add(&strips, base, &edge_rows, targets, Some(&mut *hessian));
+            strip.add(&strips, base, &edge_rows, targets, hessian.as_deref_mut());
         }
     }
     shares
@@ -195,21 +212,12 @@ fn bounding_masters<'a>(complex: &'a Complex, node: &'a Node) -> impl Iterator<I
 
 /// Assembles a film.
 pub(super) fn assemble(at: &At<'_>, film: &Film, layout: &FilmLayout, scratch: &mut Scratch) -> FilmHessian {
+    let (rows, columns) = scratch.restart(layout);
     let Scratch { hessian, map, moved } = scratch;
-    let (rows, columns) = (3 * layout.nodes.len(), layout.freedoms.len() + layout.inner.len());
-    for memory in [&mut *map, &mut *moved] {
-        memory.clear();
-        memory.resize(rows * columns, 0.0);
-    }
-    let shares = node_shares(at, film, layout, hessian);
+    let shares = node_shares(at, film, layout, Some(hessian));
     let projections = displacements(at, layout, MatMut::from_column_major_slice_mut(map, rows, columns));
     let forces = forces(at, layout, &projections, &shares.lagrangian, hessian);
-    let pull = |nodes: &[DVec3]| -> Vec<f64> {
-        let along = |column: &[f64]| {
-            nodes.iter().zip(column.chunks_exact(3)).map(|(n, d)| n.dot(DVec3::from_slice(d))).sum()
-        };
-        map.chunks_exact(rows).map(along).collect()
-    };
+    let pull = |nodes: &[DVec3]| pulled(map, nodes);
     let gradient = pull(&shares.lagrangian);
     let volumes = [pull(&shares.back), pull(&shares.front)];
     let map = MatRef::from_column_major_slice(map, rows, columns);
@@ -218,6 +226,21 @@ pub(super) fn assemble(at: &At<'_>, film: &Film, layout: &FilmLayout, scratch: &
     let mut own = Mat::zeros(columns, columns);
     matmul(own.as_mut(), Accum::Replace, map.transpose(), moved.rb(), 1.0, Par::Seq);
     FilmHessian { hessian: own, volumes, gradient, forces }
+}
+
+/// The gradient of the Lagrangian over a film's freedoms and inner motions alone.
+pub(super) fn gradient(at: &At<'_>, film: &Film, layout: &FilmLayout, scratch: &mut Scratch) -> Vec<f64> {
+    let (rows, columns) = scratch.restart(layout);
+    displacements(at, layout, MatMut::from_column_major_slice_mut(&mut scratch.map, rows, columns));
+    pulled(&scratch.map, &node_shares(at, film, layout, None).lagrangian)
+}
+
+/// A gradient by the places of nodes as one by the columns of a map to their displacements.
+fn pulled(map: &[f64], nodes: &[DVec3]) -> Vec<f64> {
+    let along = |column: &[f64]| {
+        nodes.iter().zip(column.chunks_exact(3)).map(|(n, d)| n.dot(DVec3::from_slice(d))).sum()
+    };
+    map.chunks_exact(3 * nodes.len()).map(along).collect()
 }
 
 /// The forces on bounding nodes, with what the inner nodes pass on to them; the walls' curvature under the inner nodes goes

@@ -244,7 +244,8 @@ impl System {
         let at = At { complex, places, reference, pressures, motions: &motions, frames: &self.frames };
         let assembled = self.assemble(&at);
         let walls = self.wall_entries(&at, &assembled);
-        let (rhs, residuals) = self.loads(complex, &assembled, excess);
+        let gradients: Vec<&[f64]> = assembled.iter().map(|film| &film.gradient[..]).collect();
+        let (rhs, residuals) = self.loads(complex, &gradients, excess);
         let mut forces = rhs.clone();
         forces.pressures.iter_mut().for_each(|missing| *missing = 0.0);
         let mut solution = None;
@@ -329,23 +330,43 @@ impl System {
         look(factored.as_ref(), &films, extra)
     }
 
+    /// How far a state is from equilibrium, from the gradients alone: a small part of the work of a step.
+    #[must_use]
+    pub fn residuals(
+        &self,
+        complex: &Complex,
+        places: &Places,
+        reference: &Reference,
+        pressures: &IndexVec<RegionId, f64>,
+        excess: &IndexVec<RegionId, f64>,
+    ) -> Residuals {
+        let motions = Motions::new(complex, places, &self.layout, &self.frames);
+        let at = At { complex, places, reference, pressures, motions: &motions, frames: &self.frames };
+        let films = complex.films.as_slice().par_iter().zip(&self.layout.films);
+        let gradients: Vec<Vec<f64>> = films
+            .map_init(Scratch::new, |scratch, (film, layout)| film::gradient(&at, film, layout, scratch))
+            .collect();
+        let gradients: Vec<&[f64]> = gradients.iter().map(|film| &film[..]).collect();
+        self.loads(complex, &gradients, excess).1
+    }
+
     /// Minus the gradient of the Lagrangian and the volumes that are missing; and how large they are.
     fn loads(
         &self,
         complex: &Complex,
-        films: &[FilmHessian],
+        gradients: &[&[f64]],
         excess: &IndexVec<RegionId, f64>,
     ) -> (Direction, Residuals) {
         let mut freedoms = vec![0.0; self.layout.of_freedom.len()];
-        for (film, layout) in films.iter().zip(&self.layout.films) {
-            for (&freedom, value) in layout.freedoms.iter().zip(&film.gradient) {
+        for (film, layout) in gradients.iter().zip(&self.layout.films) {
+            for (&freedom, value) in layout.freedoms.iter().zip(*film) {
                 freedoms[freedom] -= value;
             }
         }
-        let inner: Vec<Vec<f64>> = films
+        let inner: Vec<Vec<f64>> = gradients
             .iter()
             .zip(&self.layout.films)
-            .map(|(film, layout)| film.gradient[layout.freedoms.len()..].iter().map(|value| -value).collect())
+            .map(|(film, layout)| film[layout.freedoms.len()..].iter().map(|value| -value).collect())
             .collect();
         // Held freedoms carry no load: by symmetry it vanishes at equilibrium up to the error of the mesh.
         for (value, unknown) in freedoms.iter_mut().zip(&self.layout.of_freedom) {

@@ -95,7 +95,11 @@ fn the_lagrangian_along_a_step_has_the_slope_and_the_bend_that_the_system_says()
     let entries = system.entries(&films, &system.wall_entries(&at, &assembled), 0.0);
     let factored = Factored::new(&system.symbolic, entries, &softening).unwrap();
     assert!(films.iter().all(|film| film.negative == 0));
-    let (loads, _) = system.loads(&complex, &assembled, &IndexVec::from_elem(0.0, complex.regions.len()));
+    let gradients: Vec<&[f64]> = assembled.iter().map(|film| &film.gradient[..]).collect();
+    let none = IndexVec::from_elem(0.0, complex.regions.len());
+    let (loads, residuals) = system.loads(&complex, &gradients, &none);
+    // The same sums without the Hessian.
+    assert_eq!(system.residuals(&complex, &places, &reference, &pressures, &none), residuals);
     let mut rhs = loads.clone();
     rhs.freedoms
         .iter_mut()
