@@ -54,7 +54,7 @@ pub(super) fn make(
         let start = foam_run::started(&settings, gap, bar)?;
         let job = Job::new(&settings, start.seeds.psi6);
         let mut keeper = Keeper::new(&job, bar, None, Vec::new());
-        let relaxed = keeper.relax(Begin::Network(start.network), gap)?;
+        let relaxed = keeper.relax(Begin::Network { network: start.network, part: start.part }, gap)?;
         let made = Made::new(&job, gap, relaxed, keeper.record)?;
         if !matches!(made.figures.ended, Stop::Converged { .. }) {
             unsettled += 1;

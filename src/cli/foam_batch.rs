@@ -9,7 +9,7 @@ use super::{
     interrupt, progress,
 };
 use crate::{
-    foam::{relax::Stop, seeds::Seeds, start::start},
+    foam::{relax::Stop, seeds::Seeds, start::start_in_part},
     report::{foam_chart, folder::OutputFolder},
     surface::Gap,
 };
@@ -182,12 +182,12 @@ fn one(settings: &FoamSettings, gap: &Gap, best: &Mutex<Option<Best>>) -> Row {
 
 fn make(settings: &FoamSettings, gap: &Gap) -> Result<MadeRun, CliError> {
     let domain = settings.space.domain().map_err(CliError::mistake)?;
-    let start =
-        start(gap, &domain, &settings.seeds, &mut |_| interrupt::flow()).map_err(CliError::failure)?;
+    let start = start_in_part(gap, &domain, &settings.seeds, &mut |_| interrupt::flow())
+        .map_err(CliError::failure)?;
     let job = Job::new(settings, start.seeds.psi6);
     let hidden = ProgressBar::hidden();
     let mut keeper = Keeper::new(&job, &hidden, None, Vec::new());
-    let relaxed = keeper.relax(Begin::Network(start.network), gap)?;
+    let relaxed = keeper.relax(Begin::Network { network: start.network, part: start.part }, gap)?;
     let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, &hidden)?;
     let made = Made::new(&job, gap, relaxed, keeper.record)?;
     Ok((job, start.seeds, made, annealing))

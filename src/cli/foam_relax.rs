@@ -93,10 +93,10 @@ pub(super) fn run(
     let until_partition = began.elapsed().as_secs_f64();
     let job = Job::new(settings, start.seeds.psi6);
     let mut keeper = Keeper::new(&job, bar, Some(folder.target().join(CHECKPOINT)), Vec::new());
-    let relaxed = keeper.relax(Begin::Network(start.network), gap)?;
+    let relaxed = keeper.relax(Begin::Network { network: start.network, part: start.part }, gap)?;
     let until_relaxed = began.elapsed().as_secs_f64();
     if goes_on(&relaxed) {
-        let gap_volume = Some(start.partition.volume());
+        let gap_volume = (start.part >= 1.0).then(|| start.partition.volume());
         let (seeds, network) = (Some(&start.seeds), &relaxed.state);
         let origin = Origin { job: &job, settings, seeds, gap, gap_volume, network };
         let seconds = vec![
@@ -109,7 +109,9 @@ pub(super) fn run(
     }
     let (relaxed, annealing) = annealed(&job, gap, relaxed, settings.anneal, bar)?;
     let made = Made::new(&job, gap, relaxed, keeper.record)?.finished(&job, settings, gap, annealing)?;
-    made.fills(start.partition.volume())?;
+    if start.part >= 1.0 {
+        made.fills(start.partition.volume())?;
+    }
     let seconds = vec![
         ("seeds and partition", until_partition),
         ("relaxation", until_relaxed - until_partition),
@@ -163,7 +165,11 @@ impl Job {
 
 /// Where a relaxation begins.
 pub(super) enum Begin {
-    Network(Network),
+    /// In this part of the gap.
+    Network {
+        network: Network,
+        part: f64,
+    },
     State(State),
 }
 
@@ -191,8 +197,8 @@ impl<'a> Keeper<'a> {
     pub(super) fn relax(&mut self, begin: Begin, gap: &Gap) -> Result<Relaxed, CliError> {
         let settings = &self.job.relax;
         let relaxed = match begin {
-            Begin::Network(network) => {
-                relax::relax(network, gap, settings, &mut |progress| self.watch(progress))
+            Begin::Network { network, part } => {
+                relax::relax_widening(network, part, gap, settings, &mut |progress| self.watch(progress))
             }
             Begin::State(state) => relax::resume(state, gap, settings, &mut |progress| self.watch(progress)),
         };

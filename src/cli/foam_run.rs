@@ -9,7 +9,7 @@ use crate::{
     foam::{
         pattern::{PatternPlace, pattern_of_partition},
         seeds::{SeedError, Seeds, sow},
-        start::{Start, StartError, start},
+        start::{Start, StartError, start, start_in_part},
     },
     report::{foam_chart, foam_files, foam_picture::FoamScene, folder::OutputFolder},
     surface::{Gap, WallSide},
@@ -124,9 +124,10 @@ fn seeds_only(
     ])
 }
 
-/// Seeds and partition with the progress bar.
+/// Seeds and partition with the progress bar; in a deep gap those of its midst, unless the partition itself is wanted.
 pub(super) fn started(settings: &FoamSettings, gap: &Gap, bar: &ProgressBar) -> Result<Start, CliError> {
     let domain = settings.space.domain().map_err(CliError::mistake)?;
+    let start = if settings.last_stage == Stage::Partition { start } else { start_in_part };
     start(gap, &domain, &settings.seeds, &mut |share| watched(bar, "annealing seeds", share))
         .map_err(seeds_failed)
 }

@@ -1,7 +1,10 @@
-//! From nothing to a network: seeds, their partition, and new seeds where that is not sound.
+//! From nothing to a network: seeds, their partition, and new seeds where that is not sound; in deep gaps the partition of
+//! their midst.
 
 use super::{
+    convert::as_f64,
     domain::Domain,
+    ground::{Density, Ground, gap_volume},
     network::Network,
     partition::{Partition, PartitionDefect},
     seeds::{Progress, SeedError, SeedSettings, Seeds, sow},
@@ -10,6 +13,17 @@ use crate::surface::Gap;
 
 /// Draws of seeds before giving up: what fails this often has too few cells or too wide a gap.
 pub const ATTEMPTS: u64 = 5;
+
+/// Cells deeper than this many of their widths are first tried in narrower gaps, not with other seeds: few draws of many deep
+/// cells are without one that meets a wall in two patches.
+const DEEP: f64 = 2.0;
+
+/// The parts of a gap that are tried where cells are not sound in the whole.
+const PARTS: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.03125];
+
+/// Narrower gaps in which cells are deeper than this many of their widths are not tried: those of few sides would be squeezed
+/// off a wall.
+const SHALLOW: f64 = 1.2;
 
 /// Where a foam starts from.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +34,9 @@ pub struct Start {
     pub partition: Partition,
     /// The network of the cells on the middle surface.
     pub network: Network,
+    /// The part of the gap that the partition fills: the walls' levels are multiplied by it. 1 unless a narrower one was
+    /// allowed.
+    pub part: f64,
     /// What was wrong with each earlier draw of seeds.
     pub rejected: Vec<Vec<PartitionDefect>>,
 }
@@ -52,16 +69,82 @@ pub fn start(
     settings: &SeedSettings,
     progress: &mut Progress<'_>,
 ) -> Result<Start, StartError> {
+    drawn(gap, domain, settings, ATTEMPTS, progress).map_err(|failure| failure.error)
+}
+
+/// As [`start`]; where cells are sound on the middle surface and too deep for the whole gap, the partition is that of the
+/// widest of some narrower gaps in its midst.
+///
+/// # Errors
+/// [`StartError`].
+pub fn start_in_part(
+    gap: &Gap,
+    domain: &Domain,
+    settings: &SeedSettings,
+    progress: &mut Progress<'_>,
+) -> Result<Start, StartError> {
+    let depth = depth(gap, domain, settings.count);
+    let attempts = if depth > DEEP { 1 } else { ATTEMPTS };
+    let Failure { error, first, rejected } = match drawn(gap, domain, settings, attempts, progress) {
+        Ok(start) => return Ok(start),
+        Err(failure) => failure,
+    };
+    let Some(seeds) = first.filter(|_| rejected[0].iter().all(PartitionDefect::is_of_depth)) else {
+        return Err(error);
+    };
+    PARTS
+        .into_iter()
+        .filter(|part| part * depth < SHALLOW)
+        .find_map(|part| {
+            let (seeds, partition, network) =
+                divided(&gap.narrowed(part), domain, settings, seeds.clone()).ok()?;
+            Some(Start { seeds, partition, network, part, rejected: rejected.clone() })
+        })
+        .ok_or(error)
+}
+
+/// The mean distance of the walls, in mean widths of the cells.
+fn depth(gap: &Gap, domain: &Domain, cells: usize) -> f64 {
+    let area = Ground::new(gap, domain, Density::Uniform).area;
+    let width = (area / as_f64(cells) * 2.0 / 3.0_f64.sqrt()).sqrt();
+    gap_volume(gap, domain) / area / width
+}
+
+/// No draw was sound.
+struct Failure {
+    error: StartError,
+    /// The first seeds.
+    first: Option<Seeds>,
+    /// What was wrong with each draw.
+    rejected: Vec<Vec<PartitionDefect>>,
+}
+
+fn drawn(
+    gap: &Gap,
+    domain: &Domain,
+    settings: &SeedSettings,
+    attempts: u64,
+    progress: &mut Progress<'_>,
+) -> Result<Start, Failure> {
     let mut rejected = Vec::new();
-    for attempt in 0..ATTEMPTS {
-        let seeds = sow(gap, domain, settings, attempt, progress)?;
-        match divided(gap, domain, settings, seeds) {
-            Ok((seeds, partition, network)) => return Ok(Start { seeds, partition, network, rejected }),
+    let mut first = None;
+    for attempt in 0..attempts {
+        let seeds = sow(gap, domain, settings, attempt, progress).map_err(|error| Failure {
+            error: error.into(),
+            first: None,
+            rejected: Vec::new(),
+        })?;
+        match divided(gap, domain, settings, seeds.clone()) {
+            Ok((seeds, partition, network)) => {
+                return Ok(Start { seeds, partition, network, part: 1.0, rejected });
+            }
             Err(defects) => rejected.push(defects),
         }
+        first.get_or_insert(seeds);
     }
-    let defects = rejected.pop().unwrap_or_default();
-    Err(StartError::Unsound { attempts: ATTEMPTS, cells: settings.count, defects })
+    let defects = rejected.last().cloned().unwrap_or_default();
+    let error = StartError::Unsound { attempts, cells: settings.count, defects };
+    Err(Failure { error, first, rejected })
 }
 
 type Divided = (Seeds, Partition, Network);

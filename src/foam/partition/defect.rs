@@ -102,6 +102,21 @@ pub enum PartitionDefect {
     Network(#[from] NetworkDefect),
 }
 
+impl PartitionDefect {
+    /// Whether the cells may be sound in a narrower gap round the same middle surface.
+    #[must_use]
+    pub const fn is_of_depth(&self) -> bool {
+        matches!(
+            self,
+            Self::Tangled { .. }
+                | Self::Pieces { .. }
+                | Self::Patches { .. }
+                | Self::Curved { .. }
+                | Self::Volume { .. }
+        )
+    }
+}
+
 const fn name(wall: WallSide) -> &'static str {
     match wall {
         WallSide::Lower => "lower",

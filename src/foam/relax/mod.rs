@@ -166,17 +166,39 @@ pub fn relax(
     settings: &RelaxSettings,
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
-    let shares = shares(&network, settings.shares.as_deref())?;
-    resume(first_state(network, gap, shares)?, gap, settings, progress)
+    relax_widening(network, 1.0, gap, settings, progress)
 }
 
-/// The coarse films of a network, from wall to wall; in the midst of the gap where its walls are too steep to start from.
-fn first_state(network: Network, gap: &Gap, shares: IndexVec<CellId, f64>) -> Result<State, NoExtrusion> {
-    match laid(network.clone(), gap, shares.clone()) {
-        Ok(state) if !widen::is_steep(&state) => Ok(state),
+/// Relaxes the foam that `network` starts in a `part` of `gap`, and widens that to the whole of it: for a network that is
+/// sound only between nearer walls.
+///
+/// # Errors
+/// As [`relax`].
+pub fn relax_widening(
+    network: Network,
+    part: f64,
+    gap: &Gap,
+    settings: &RelaxSettings,
+    progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Relaxed, RelaxError> {
+    let shares = shares(&network, settings.shares.as_deref())?;
+    resume(first_state(network, part, gap, shares)?, gap, settings, progress)
+}
+
+/// The coarse films of a network, from wall to wall of a part of the gap; of a smaller one in its midst where its walls are too
+/// steep to start from.
+fn first_state(
+    network: Network,
+    part: f64,
+    gap: &Gap,
+    shares: IndexVec<CellId, f64>,
+) -> Result<State, NoExtrusion> {
+    match laid(network.clone(), &gap.narrowed(part), shares.clone()) {
+        Ok(state) if !widen::is_steep(&state) => Ok(State { part, ..state }),
         _ => {
-            let narrow = laid(network, &gap.narrowed(widen::FIRST_PART), shares)?;
-            Ok(State { part: widen::FIRST_PART, ..narrow })
+            let part = widen::FIRST_PART * part;
+            let narrow = laid(network, &gap.narrowed(part), shares)?;
+            Ok(State { part, ..narrow })
         }
     }
 }

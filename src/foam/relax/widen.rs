@@ -49,8 +49,8 @@ pub(super) const FIRST_PART: f64 = 0.25;
 /// By how much the gap grows from stage to stage; half as much in the logarithm after each stage that failed.
 const GROWTH: f64 = 1.25;
 
-/// A stage that widens by less is not tried: the end is known to a few hundredths then.
-const LEAST_GROWTH: f64 = 1.03;
+/// A stage that widens by less is not tried: foams of free topology go on from there.
+const LEAST_GROWTH: f64 = 1.1;
 
 /// Newton steps of one stage; those that settle take three to twenty.
 const STAGE_STEPS: usize = 30;
