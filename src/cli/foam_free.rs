@@ -53,6 +53,8 @@ struct Figures {
     charge: [i64; 2],
     /// Cells that touch other cells on one wall than on the other.
     twisted_cells: usize,
+    /// Cells that do not touch the lower and the upper wall.
+    cells_off_walls: [usize; 2],
     /// Corners inside the gap, where four borders meet.
     inner_corners: usize,
     films: usize,
@@ -238,6 +240,8 @@ fn figures(
         cut_cells: foam.division.cut().into_iter().filter(|&cut| cut).count(),
         charge: patterns.each_ref().map(CellPattern::charge),
         twisted_cells: foam.twisted_cells(),
+        cells_off_walls: [0, 1]
+            .map(|wall: usize| foam.division.touches().iter().filter(|touched| !touched[wall]).count()),
         inner_corners: foam.division.inner_corners(),
         films: foam.division.polygons.len(),
         gap_volume: total,
@@ -313,8 +317,10 @@ fn table(figures: &Figures) -> Vec<Line> {
         (
             "other neighbours",
             format!(
-                "{} cells on one wall than on the other, {} corners inside the gap; films from wall to wall up to {:.0} % of it",
+                "{} cells on one wall than on the other ({} and {} without the lower and the upper one), {} corners inside the gap; films from wall to wall up to {:.0} % of it",
                 figures.twisted_cells,
+                figures.cells_off_walls[0],
+                figures.cells_off_walls[1],
                 figures.inner_corners,
                 100.0 * figures.network_part
             ),

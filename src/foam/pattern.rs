@@ -135,9 +135,10 @@ pub fn pattern_of_free(
 }
 
 /// The number of sides and the status of a cell with these walls. One that ends at a plane is cut, like a cell at the edge of
-/// a photograph: how many sides the rest of it would have is not known.
+/// a photograph: how many sides the rest of it would have is not known. So is one that does not reach the surface: others hide
+/// it.
 fn counted(walls: &[CellWall]) -> (Option<u32>, CellStatus) {
-    if walls.iter().any(|wall| wall.neighbour.is_none()) {
+    if walls.is_empty() || walls.iter().any(|wall| wall.neighbour.is_none()) {
         (None, CellStatus::Cut)
     } else {
         (Some(crate::index::checked_u32(walls.len())), CellStatus::Complete)

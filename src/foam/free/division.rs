@@ -45,7 +45,7 @@ pub struct Polygon {
 /// Which walls the cells touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stacking {
-    /// One layer: every cell touches both walls.
+    /// One layer: cells reach from wall to wall at first; in a deep gap one may leave a wall, or come to one.
     One,
     /// Two layers: every cell touches its own wall only.
     Two {
@@ -55,12 +55,12 @@ pub enum Stacking {
 }
 
 impl Stacking {
-    /// Whether a cell touches the lower and the upper wall.
+    /// Whether a cell has to touch the lower and the upper wall; nothing if it may touch those that it comes to.
     #[must_use]
-    pub const fn walls(self, cell: usize) -> [bool; 2] {
+    pub const fn walls(self, cell: usize) -> Option<[bool; 2]> {
         match self {
-            Self::One => [true; 2],
-            Self::Two { lower } => [cell < lower, cell >= lower],
+            Self::One => None,
+            Self::Two { lower } => Some([cell < lower, cell >= lower]),
         }
     }
 }
@@ -103,7 +103,7 @@ impl Division {
         })
     }
 
-    /// How many cells, the first ones, touch the lower wall.
+    /// How many cells, the first ones, belong to the lower wall.
     #[must_use]
     pub const fn lower(&self) -> usize {
         match self.stacking {
@@ -112,7 +112,7 @@ impl Division {
         }
     }
 
-    /// Whether a cell touches the lower wall.
+    /// Whether a cell belongs to the lower wall.
     #[must_use]
     pub const fn is_lower(&self, cell: usize) -> bool {
         cell < self.lower()
@@ -122,6 +122,13 @@ impl Division {
     #[must_use]
     pub fn inner_corners(&self) -> usize {
         self.corners.iter().filter(|corner| corner.wall.is_none() && corner.plane.is_none()).count()
+    }
+
+    /// Whether each cell touches the lower and the upper wall.
+    #[must_use]
+    pub fn touches(&self) -> Vec<[bool; 2]> {
+        let [lower, upper] = WallSide::BOTH.map(|wall| self.rims(wall));
+        lower.iter().zip(&upper).map(|(low, high)| [!low.is_empty(), !high.is_empty()]).collect()
     }
 
     /// The walls of `gap`, then the planes that cut it off.

@@ -68,7 +68,7 @@ pub fn unlawful(division: &Division) -> Vec<Unlawful> {
         for wall in WallSide::BOTH {
             let rim = &rims[wall as usize][cell];
             let touches = !rim.is_empty();
-            if touches != division.stacking.walls(cell)[wall as usize] {
+            if division.stacking.walls(cell).is_some_and(|walls| walls[wall as usize] != touches) {
                 found.push(Unlawful::Wall { cell, wall, touches });
             }
             // A plane that cuts a patch off opens the line round it.
@@ -98,7 +98,7 @@ impl Division {
     /// Euler's number of the cells on a wall: corners less edges plus cells.
     pub(super) fn euler_of(&self, wall: WallSide) -> i64 {
         let rims = self.rims(wall);
-        let cells = (0..self.seeds.len()).filter(|&cell| self.stacking.walls(cell)[wall as usize]);
+        let cells = rims.iter().filter(|rim| !rim.is_empty());
         let cut_lines = rims.iter().filter(|rim| open_ends(rim).is_some()).count();
         let edges = rims.iter().map(Vec::len).sum::<usize>() / 2 + cut_lines;
         let corners = self.corners.iter().filter(|corner| corner.wall == Some(wall)).count();

@@ -16,9 +16,9 @@
 //! | what cells cover of the walls | `outline.rs` |
 //! | angles at corners | `angles.rs` |
 //!
-//! Not promised: balance. A change that would take a cell to a wall that it does not touch, away from one that it does, or to a
-//! second film with a neighbour is not made, nor one at corners where more than four cells meet, as in the bees' arrangement; a
-//! foam that needs it ends as stalled, with the borders that vanish.
+//! Not promised: balance. A change at corners where more than four cells meet, as in the bees' arrangement, is not made; nor, in
+//! two layers, one by which a cell would leave its wall, reach the other or get a second film with a neighbour; nor one that
+//! leaves a film with two corners. A foam that needs it ends as stalled, with the borders that vanish.
 
 mod angles;
 mod division;

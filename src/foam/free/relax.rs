@@ -101,14 +101,18 @@ const HELD_UP_BY: f64 = 3.0;
 /// Sides below this part of the spacing are slivers: they are opened to that length before films are laid anew, and go if
 /// steps are held up. It lies below [`VANISHING`], so that what goes on shrinking changes the topology in the next steps.
 const SLIVER: f64 = 0.03;
-/// A cell whose patch on its wall has a rim shorter than this part of the spacing leaves the wall: patches of foams in balance have
-/// rims of a spacing and more, and one as small is squeezed by its own cell's pressure, the more the smaller it is.
+/// A cell that has to keep its wall and whose patch there has a rim shorter than this part of the spacing leaves it: patches of
+/// foams in balance have rims of a spacing and more, and one as small is squeezed by its own cell's pressure, the more the
+/// smaller it is.
 const SQUEEZED_OFF: f64 = 0.2;
 /// So many such steps on end, with nothing to go, and the films are laid anew; at most so often.
 const MOST_HELD_UP: usize = 4;
 const MOST_SPREADS: usize = 12;
 /// By how much each flip of the same bodies lowers their threshold, so that none flips back and forth for ever.
 const WEARINESS: f64 = 0.6;
+
+/// The largest volume error at the end, relative to the mean volume: rounding leaves 9e-11 among two thousand cells.
+const VOLUME_TOLERANCE: f64 = 1e-10;
 
 /// The coarsest films.
 pub(super) const FIRST_FINENESS: usize = 0;
@@ -245,7 +249,8 @@ impl Run<'_> {
     ) -> Result<(Descended, Vanishing), FactorError> {
         let FreeSettings { spacing, tolerance, .. } = *self.settings;
         let tolerance = if self.fineness < self.settings.fineness { FIRST_TOLERANCE } else { tolerance };
-        let settings = DescentSettings { length: spacing, tolerance, volume_tolerance: 1e-11, step_limit };
+        let volume_tolerance = tolerance.max(VOLUME_TOLERANCE);
+        let settings = DescentSettings { length: spacing, tolerance, volume_tolerance, step_limit };
         let mut before = self.lengths(descent);
         let mut shrinking = Vanishing::default();
         let mut held_up = 0;
@@ -310,7 +315,7 @@ impl Run<'_> {
         Vanishing { sides, small, ..Vanishing::default() }
     }
 
-    /// Cells whose patch on a wall of theirs has shrunk to next to nothing.
+    /// Cells whose patch on a wall that they have to keep has shrunk to next to nothing.
     fn leaving(&self, now: &Lengths) -> Vec<(usize, WallSide)> {
         let mut rims = vec![[0.0; 2]; self.division.seeds.len()];
         for polygon in &self.division.polygons {
@@ -323,7 +328,7 @@ impl Run<'_> {
             }
         }
         let gone = |&(cell, wall): &(usize, WallSide)| {
-            self.division.stacking.walls(cell)[wall as usize]
+            self.division.stacking.walls(cell).is_some_and(|walls| walls[wall as usize])
                 && rims[cell][wall as usize] < SQUEEZED_OFF * self.settings.spacing
         };
         let patches = (0..rims.len()).flat_map(|cell| WallSide::BOTH.map(|wall| (cell, wall)));

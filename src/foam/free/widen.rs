@@ -93,11 +93,16 @@ const GROWTH: f64 = 1.1;
 const LEAST_GROWTH: f64 = 1.02;
 /// Newton steps of a stage on the coarsest films: those that settle take three to a hundred.
 const STAGE_STEPS: usize = 150;
+/// Steps times cells of stages in vain, after which no wider gap is tried: a few minutes' work.
+const MOST_LOST: usize = 150_000;
+const LEAST_STEPS: usize = 30;
 /// Steps of which less than this part could be taken are held up; after so many of them a stage is given up.
 const HELD_UP: f64 = 0.05;
 const MOST_HELD_UP: usize = 20;
-/// The fineness of stages that do not settle on the coarsest films.
-const MOST_COARSE: usize = 1;
+/// The fineness of stages after the first that does not settle on the coarsest films.
+const FINEST_STAGE: usize = 1;
+/// Foams that are tried on the final films, the widest first, until one settles.
+const MOST_WIDEST: usize = 4;
 /// The force at which a stage ends: topology has settled by then.
 const STAGE_TOLERANCE: f64 = 1e-3;
 /// A film's end that lies beyond a plane by more than this part of the spacing has slid round a corner.
@@ -114,46 +119,90 @@ pub fn widened(
     progress: &mut dyn FnMut(&WideningStep<'_>) -> ControlFlow<()>,
 ) -> Result<Widened, FactorError> {
     let narrow = gap.narrowed(state.part);
-    let (division, films) = taken_over(state, &narrow, FIRST_FINENESS);
-    let begin = Begin { division, films, fineness: FIRST_FINENESS, pressures: state.pressures.clone() };
+    let begin = |fineness| {
+        let (division, films) = taken_over(state, &narrow, fineness);
+        Begin { division, films, fineness, pressures: state.pressures.clone() }
+    };
     let mut stages = Stages { gap, settings, steps: 0, flips: 0, progress };
-    let (mut foam, mut obstacle) = stages.coarse(begin, state.part)?;
-    stages.flips += foam.flips;
-    let (mut part, mut growth, mut fineness) = (state.part, GROWTH, FIRST_FINENESS);
-    while part < 1.0 && obstacle != Some(Obstacle::Interrupted) {
-        if growth < LEAST_GROWTH {
-            if fineness >= MOST_COARSE {
-                break;
-            }
+    let mut fineness = FIRST_FINENESS;
+    let (mut first, mut obstacle) = stages.coarse(begin(fineness), state.part)?;
+    if obstacle.is_some() && obstacle != Some(Obstacle::Interrupted) {
+        fineness = FINEST_STAGE;
+        (first, obstacle) = stages.coarse(begin(fineness), state.part)?;
+    }
+    stages.flips += first.flips;
+    let mut settled = vec![Settled { foam: first, part: state.part, flips: stages.flips }];
+    let (mut growth, mut lost) = (GROWTH, 0);
+    while let Some(Settled { foam, part, .. }) = settled.last()
+        && *part < 1.0
+        && obstacle != Some(Obstacle::Interrupted)
+    {
+        if growth < GROWTH && fineness < FINEST_STAGE {
             // Long and thin films fold on the coarsest elements first.
-            (fineness, growth) = (MOST_COARSE, GROWTH);
+            (fineness, growth) = (FINEST_STAGE, GROWTH);
         }
-        let wider = (part * growth).min(1.0);
-        let tried = moved_apart(&foam, &gap.narrowed(part), &gap.narrowed(wider))
+        if growth < LEAST_GROWTH || lost > MOST_LOST {
+            break;
+        }
+        let before = stages.steps;
+        let (part, wider) = (*part, (part * growth).min(1.0));
+        let tried = moved_apart(foam, &gap.narrowed(part), &gap.narrowed(wider))
             .map(|begin| refined(begin, &gap.narrowed(wider), fineness))
             .and_then(|begin| stages.coarse(begin, wider).ok());
         match tried {
-            Some((settled, None)) => {
-                stages.flips += settled.flips;
+            Some((foam, None)) => {
+                stages.flips += foam.flips;
                 growth = (growth * growth).min(GROWTH);
-                (foam, part, obstacle) = (settled, wider, None);
+                settled.push(Settled { foam, part: wider, flips: stages.flips });
+                obstacle = None;
             }
             Some((_, found)) => (obstacle, growth) = (found, growth.sqrt()),
             None => growth = growth.sqrt(),
         }
+        if obstacle.is_some() {
+            lost += (stages.steps - before) * state.shares.len();
+        }
     }
-    let begin = Begin {
-        fineness: foam.fineness,
-        division: foam.division,
-        films: foam.films,
-        pressures: foam.pressures,
-    };
-    let foam = stages.relaxed(begin, part, settings)?.0;
-    let flips = stages.flips + foam.flips;
-    if part >= 1.0 || obstacle.is_none() {
-        obstacle = self::obstacle(&foam, settings.spacing);
+    widest(stages, settled, obstacle)
+}
+
+/// A foam that has settled on coarse films in a part of the gap, after so many changes of topology.
+struct Settled {
+    foam: FreeFoam,
+    part: f64,
+    flips: usize,
+}
+
+/// The foam in the widest part of the gap that comes to balance on the films that were asked for; in the widest of all if none
+/// of the last ones does.
+fn widest(
+    mut stages: Stages<'_>,
+    mut settled: Vec<Settled>,
+    mut obstacle: Option<Obstacle>,
+) -> Result<Widened, FactorError> {
+    let mut first = None;
+    for _ in 0..MOST_WIDEST {
+        let Some(Settled { foam, part, flips }) = settled.pop() else { break };
+        let FreeFoam { fineness, division, films, pressures, .. } = foam;
+        stages.flips = flips;
+        let foam = stages.relaxed(Begin { division, films, fineness, pressures }, part, stages.settings)?.0;
+        let found = self::obstacle(&foam, stages.settings.spacing);
+        let flips = flips + foam.flips;
+        let ends = found.is_none() || found == Some(Obstacle::Interrupted);
+        // What stopped a wider foam stands in the way of the whole gap.
+        obstacle =
+            if part >= 1.0 || found == Some(Obstacle::Interrupted) { found } else { obstacle.or(found) };
+        if part < 1.0 && obstacle.is_none() {
+            obstacle = Some(Obstacle::Unsettled { force: foam.descended.residuals.force });
+        }
+        let widened = Widened { foam, part, obstacle, steps: stages.steps, flips };
+        if ends {
+            return Ok(widened);
+        }
+        first.get_or_insert(widened);
     }
-    Ok(Widened { foam, part, obstacle, steps: stages.steps, flips })
+    let Some(first) = first else { unreachable!("the foam that the stages start from is among them") };
+    Ok(Widened { steps: stages.steps, ..first })
 }
 
 /// Stages on their way.
@@ -171,7 +220,7 @@ impl Stages<'_> {
         let settings = FreeSettings {
             fineness: begin.fineness,
             tolerance: STAGE_TOLERANCE,
-            step_limit: STAGE_STEPS,
+            step_limit: STAGE_STEPS.min(MOST_LOST / begin.division.seeds.len()).max(LEAST_STEPS),
             ..*self.settings
         };
         let (foam, held_up) = self.relaxed(begin, part, &settings)?;
@@ -191,7 +240,7 @@ impl Stages<'_> {
         settings: &FreeSettings,
     ) -> Result<(FreeFoam, bool), FactorError> {
         let Self { gap, flips, progress, .. } = self;
-        let is_stage = settings.step_limit == STAGE_STEPS;
+        let is_stage = settings.step_limit <= STAGE_STEPS;
         let mut held_up = 0;
         let foam = relaxed_from(begin, &gap.narrowed(part), settings, &mut |step| {
             held_up += usize::from(step.fraction < HELD_UP);
@@ -241,7 +290,9 @@ fn obstacle(foam: &FreeFoam, spacing: f64) -> Option<Obstacle> {
     }
     match foam.descended.ending {
         Ending::Converged => return None,
-        Ending::Halted if foam.vanishing.is_empty() && foam.leaving.is_empty() => {
+        Ending::Halted
+            if foam.vanishing.is_empty() && foam.leaving.is_empty() && foam.unlawful.is_empty() =>
+        {
             return Some(Obstacle::Interrupted);
         }
         _ => {}

@@ -3,7 +3,8 @@
 //! Both are one move and its reverse (K. A. Brakke, "The Surface Evolver"; the 2–3 move of triangulations). A border between
 //! the bodies X, Y, Z ends at two corners, U beyond the one and V beyond the other. It becomes a triangle between U and V,
 //! whose corners are XYUV, YZUV and ZXUV. A wall counts as a body: an edge on a wall is a border of two cells and the wall, so
-//! that the T1 on a wall is the same move.
+//! that the T1 on a wall is the same move; and what a cell covers of a wall is a film between the two, so that a cell of three
+//! sides there leaves the wall, and comes to it again, by the same moves.
 //!
 //! A film that meets the changed corners has a run of them among its own; what it gets instead are the new corners that
 //! both its bodies share, in the order of the borders by which the run is entered and left.
@@ -11,7 +12,7 @@
 mod rewrite;
 
 use super::{
-    division::{Corner, CornerImage, Division, moved},
+    division::{Corner, CornerImage, Division, Stacking, moved},
     films::Side,
 };
 use crate::surface::{Gap, WallSide};
@@ -179,23 +180,42 @@ impl<'a> Moves<'a> {
             .collect()
     }
 
-    /// Triangles that cells cover of a plane, with two corners of a side among theirs: their corners, the plane and the cell.
-    fn cut_triangles(&self, first: CornerImage, second: CornerImage) -> Vec<(Vec<CornerImage>, [Body; 2])> {
-        let Some(plane) = self.division.corners[first.corner].plane else { return Vec::new() };
+    /// Triangles that cells cover of a plane, or of a wall that they may leave, with two corners of a side among theirs: their
+    /// corners, the plane or wall, and the cell.
+    pub(super) fn covered_triangles(
+        &self,
+        first: CornerImage,
+        second: CornerImage,
+    ) -> Vec<(Vec<CornerImage>, [Body; 2])> {
         let shared: Vec<Body> = self.bodies(first).intersection(&self.bodies(second)).copied().collect();
-        let triangle = |&body: &Body| {
-            let Body::Cell(cell, shift) = body else { return None };
-            let on_plane = |image: &CornerImage| self.division.corners[image.corner].plane == Some(plane);
+        let is_left = |body: &Body| match body {
+            Body::Cell(..) => false,
+            Body::Plane(_) => true,
+            Body::Wall(_) => self.division.stacking == Stacking::One,
+        };
+        let triangle = |hard: Body, soft: Body| {
+            let Body::Cell(cell, shift) = soft else { return None };
             let corners: Vec<CornerImage> = self
                 .corners_of(cell)
                 .into_iter()
-                .filter(on_plane)
+                .filter(|image| self.lies_on(image.corner, hard))
                 .map(|image| moved(image, IVec3::from_array(shift)))
                 .collect();
             let whole = corners.len() == 3 && corners.contains(&first) && corners.contains(&second);
-            whole.then_some((corners, [Body::Plane(plane), body]))
+            whole.then_some((corners, [hard, soft]))
         };
-        shared.iter().filter_map(triangle).collect()
+        let hard = shared.iter().copied().filter(is_left);
+        hard.flat_map(|hard| shared.iter().filter_map(move |&soft| triangle(hard, soft))).collect()
+    }
+
+    /// Whether a corner lies on a wall or a plane.
+    fn lies_on(&self, corner: usize, body: Body) -> bool {
+        let Corner { wall, plane, .. } = self.division.corners[corner];
+        match body {
+            Body::Wall(side) => wall == Some(side),
+            Body::Plane(at) => plane == Some(at),
+            Body::Cell(..) => false,
+        }
     }
 
     /// The bodies that meet along a border or an edge on a wall and at its two ends; nothing where more than four bodies meet
@@ -243,7 +263,7 @@ impl<'a> Moves<'a> {
                 let corners: Vec<CornerImage> = corners.map(|&image| moved(image, seen.back)).collect();
                 (corners, self.sides(seen.polygon, seen.back))
             });
-            let all = films.chain(self.cut_triangles(first, second));
+            let all = films.chain(self.covered_triangles(first, second));
             let mut rewrites = all.filter_map(|(corners, sides)| self.film_to_border(corners, sides, small));
             rewrites.find_map(|rewrite| {
                 let rewritten = self.rewritten(&rewrite)?;

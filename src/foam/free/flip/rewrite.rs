@@ -1,7 +1,7 @@
 //! The two moves: where their new corners stand, and what the films round them become.
 
 use super::{Body, Moves, plane_of, wall_of};
-use crate::foam::free::division::{CornerImage, Polygon, moved};
+use crate::foam::free::division::{Corner, CornerImage, Polygon, Stacking, moved};
 use glam::{DVec3, IVec3};
 use std::collections::{BTreeMap, BTreeSet, btree_map::Entry};
 
@@ -9,6 +9,9 @@ use std::collections::{BTreeMap, BTreeSet, btree_map::Entry};
 const NEW_SIZE: f64 = 0.06;
 /// The part of the shortest adjoining border that new corners may use up.
 const ROOM: f64 = 0.4;
+
+/// The shortest side of a triangle whose other sides are longer than a small one's, in units of the latter, when it goes.
+const LONG: f64 = 0.3;
 
 /// The old and the new corners of a move, all in one frame.
 pub(super) struct Rewrite {
@@ -28,28 +31,37 @@ impl Moves<'_> {
     /// Whether a film or a place on a wall may come to be between two bodies: not a second one, none between walls, and none
     /// through which a cell would reach the wall of the other layer or a layer lose its own.
     fn may_touch(&self, u: Body, v: Body) -> bool {
-        if let (Body::Cell(cell, _), Body::Plane(_)) | (Body::Plane(_), Body::Cell(cell, _)) = (u, v) {
-            // A cell that ends at a plane already would do so in two places.
-            return self
-                .corners_of(cell)
-                .iter()
-                .all(|image| self.division.corners[image.corner].plane.is_none());
-        }
-        let (Body::Cell(cell, at), Body::Cell(other, there)) = (u, v) else { return false };
+        let ((Body::Cell(cell, at), other) | (other, Body::Cell(cell, at))) = (u, v) else { return false };
+        // A cell that ends at a plane or a wall already would do so in two places.
+        let keeps_off = |is_there: &dyn Fn(&Corner) -> bool| {
+            !self.corners_of(cell).iter().any(|image| is_there(&self.division.corners[image.corner]))
+        };
+        let (other, there) = match other {
+            Body::Cell(other, there) => (other, there),
+            Body::Plane(_) => return keeps_off(&|corner| corner.plane.is_some()),
+            Body::Wall(side) => {
+                return self.division.stacking == Stacking::One
+                    && keeps_off(&|corner| corner.wall == Some(side));
+            }
+        };
         let apart = IVec3::from_array(there) - IVec3::from_array(at);
+        // Long cells may part in the midst of the gap and touch on both walls.
+        let may_again = self.division.stacking == Stacking::One;
         (cell, [0; 3]) != (other, apart.to_array())
-            && self.division.polygons.iter().enumerate().all(|(id, film)| {
-                let same = (film.cell, film.neighbour, film.shift) == (cell, other, apart)
-                    || (film.cell, film.neighbour, film.shift) == (other, cell, -apart);
-                !same || self.dead_polygons.contains(&id)
-            })
+            && (may_again
+                || self.division.polygons.iter().enumerate().all(|(id, film)| {
+                    let same = (film.cell, film.neighbour, film.shift) == (cell, other, apart)
+                        || (film.cell, film.neighbour, film.shift) == (other, cell, -apart);
+                    !same || self.dead_polygons.contains(&id)
+                }))
     }
 
     pub(super) fn border_to_film(&self, first: CornerImage, second: CornerImage) -> Option<Rewrite> {
         let (p, q) = (self.bodies(first), self.bodies(second));
         let shared: Vec<Body> = p.intersection(&q).copied().collect();
         let (u, v) = (*p.difference(&q).next()?, *q.difference(&p).next()?);
-        if !self.may_touch(u, v) {
+        // A triangle beside it would be left with two corners: it goes as a whole.
+        if !self.may_touch(u, v) || !self.covered_triangles(first, second).is_empty() {
             return None;
         }
         let (start, end) = (self.division.place(first), self.division.place(second));
@@ -80,7 +92,7 @@ impl Moves<'_> {
         Some(Rewrite { new: new.collect(), old: vec![first, second] })
     }
 
-    /// What a triangle between two bodies becomes when it shrinks to nothing, a film or what a cell covers of a plane.
+    /// What a triangle between two bodies becomes when it shrinks to nothing, a film or what a cell covers of a plane or wall.
     pub(super) fn film_to_border(
         &self,
         corners: Vec<CornerImage>,
@@ -88,7 +100,11 @@ impl Moves<'_> {
         small: f64,
     ) -> Option<Rewrite> {
         let places: Vec<DVec3> = corners.iter().map(|&image| self.division.place(image)).collect();
-        if (0..3).any(|i| places[i].distance(places[(i + 1) % 3]) > small) {
+        let length = |i: &usize| places[*i].distance(places[(i + 1) % 3]);
+        let shortest = (0..3).min_by(|i, j| length(i).total_cmp(&length(j)))?;
+        let is_small = (0..3).all(|i| length(&i) <= small);
+        // A film is not left with two corners: where one side of a longer triangle vanishes, it goes from there.
+        if !is_small && (self.division.stacking != Stacking::One || length(&shortest) > LONG * small) {
             return None;
         }
         let bodies: Vec<BTreeSet<Body>> = corners.iter().map(|&image| self.bodies(image)).collect();
@@ -96,7 +112,10 @@ impl Moves<'_> {
         if all.len() != 5 || bodies.iter().any(|at| at.len() != 4) {
             return None;
         }
-        let middle = places.iter().sum::<DVec3>() / 3.0;
+        let middle = match is_small {
+            true => places.iter().sum::<DVec3>() / 3.0,
+            false => 0.5 * (places[shortest] + places[(shortest + 1) % 3]),
+        };
         let (mut room, mut axis) = (f64::INFINITY, DVec3::ZERO);
         for ((&corner, place), at) in corners.iter().zip(&places).zip(&bodies) {
             let borders = self.borders(corner);
@@ -194,8 +213,8 @@ impl Moves<'_> {
         }
         let in_all = |body: &&Body| rewrite.new.iter().all(|(bodies, _)| bodies.contains(body));
         let common: Vec<Body> = rewrite.new[0].0.iter().filter(in_all).copied().collect();
-        if let [Body::Cell(..), Body::Plane(_)] = common[..] {
-            // The cell comes to the plane, on which it has no film.
+        if let [Body::Cell(..), Body::Plane(_) | Body::Wall(_)] = common[..] {
+            // The cell comes to the plane or the wall, on which it has no film.
             return Some(None);
         }
         let [Body::Cell(cell, at), Body::Cell(neighbour, there)] = common[..] else { return None };

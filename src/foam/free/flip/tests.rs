@@ -2,11 +2,14 @@
 
 use super::*;
 use crate::foam::{
-    free::open::sides,
+    free::{FreeSettings, extruded::taken_over, films::side_between, laws::unlawful, open::sides},
     layers::{Arrangement, divided, sheets},
+    relax::{RelaxSettings, relax},
+    seeds::SeedSettings,
     setup::{FoamSpace, SpaceError},
+    start::start,
 };
-use std::ops::ControlFlow;
+use std::{error::Error, ops::ControlFlow};
 
 const SPACE: FoamSpace = FoamSpace::Plane { periods: [4.0, 4.6], height: 2.3 };
 
@@ -79,5 +82,64 @@ fn four_bodies_meet_at_every_corner_even_of_one_that_lies_near_a_wall() -> Resul
     let sown =
         sheets(&space, &gap, Arrangement::Annealed, 105, 1, &mut |_| ControlFlow::Continue(())).unwrap();
     assert_lawful(&divided(&gap, &domain, &sown).unwrap(), &gap);
+    Ok(())
+}
+
+/// A flat foam of one layer.
+fn one_layer() -> Result<(Division, Gap, f64), Box<dyn Error>> {
+    let space = FoamSpace::Plane { periods: [4.0, 4.6], height: 1.0 };
+    let (gap, domain) = (space.gap()?, space.domain()?);
+    let started = start(&gap, &domain, &SeedSettings::new(18, 4), &mut |_| ControlFlow::Continue(()))?;
+    let settings = RelaxSettings::default();
+    let relaxed = relax(started.network, &gap, &settings, &mut |_| ControlFlow::Continue(()))?;
+    let division = taken_over(&relaxed.state, &gap, 0).0;
+    Ok((division, gap, FreeSettings::of(&relaxed.state).spacing))
+}
+
+/// The division after the first of `sides` that can vanish into a lawful one.
+fn changed(division: &Division, gap: &Gap, spacing: f64, sides: &[Side]) -> Option<Division> {
+    sides.iter().find_map(|&side| {
+        let mut moves = Moves::new(division, gap, spacing);
+        moves.vanish(side, f64::INFINITY)?;
+        Some(moves.finish().0).filter(|after| unlawful(after).is_empty())
+    })
+}
+
+#[test]
+fn a_cell_leaves_a_wall_when_its_patch_is_a_triangle_and_comes_back() -> Result<(), Box<dyn Error>> {
+    let (mut division, gap, spacing) = one_layer()?;
+    let (cell, wall) = (5, WallSide::Upper);
+    let rim = |division: &Division| -> Vec<Side> {
+        let own = division.rims(wall)[cell].clone();
+        own.iter().map(|edge| side_between(edge.from, edge.to).0).collect()
+    };
+    while rim(&division).len() > 3 {
+        division = changed(&division, &gap, spacing, &rim(&division)).ok_or("no T1")?;
+    }
+    assert_eq!(division.touches()[cell], [true; 2]);
+    let counts = |division: &Division| [division.corners.len(), division.polygons.len()];
+    let [corners, films] = counts(&division);
+
+    let off = changed(&division, &gap, spacing, &rim(&division)).ok_or("the cell stays")?;
+    assert_eq!(off.touches()[cell], [true, false]);
+    assert_lawful(&off, &gap);
+    // Three corners of the patch become one on the wall and one inside; the patch was no film.
+    assert_eq!(counts(&off), [corners - 1, films]);
+    assert_eq!(off.euler_of(wall), division.euler_of(wall));
+
+    let from_wall = |side: &Side| {
+        let [a, b] = [side.0, side.1].map(|corner| off.corners[corner].wall);
+        [a, b].contains(&None) && [a, b].contains(&Some(wall)) && side.0.max(side.1) >= corners - 3
+    };
+    let borders: Vec<Side> = sides(&off).into_keys().filter(from_wall).collect();
+    let back = changed(&off, &gap, spacing, &borders).ok_or("the cell does not come back")?;
+    assert_eq!(back.touches()[cell], [true; 2]);
+    assert_lawful(&back, &gap);
+    assert_eq!(counts(&back), [corners, films]);
+
+    // In two layers every cell keeps its wall.
+    let layered = Division { stacking: Stacking::Two { lower: 0 }, ..division.clone() };
+    let stays = |&side: &Side| !Moves::new(&layered, &gap, spacing).can_vanish(side, f64::INFINITY);
+    assert!(rim(&layered).iter().all(stays));
     Ok(())
 }
