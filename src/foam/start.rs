@@ -173,3 +173,27 @@ fn list(defects: &[PartitionDefect]) -> String {
     let rest = defects.len().saturating_sub(NAMED);
     if rest == 0 { named.join("; ") } else { format!("{}; and {rest} more", named.join("; ")) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foam::setup::{FoamSpace, PeriodicSurface, PeriodicWalls};
+    use std::{error::Error, ops::ControlFlow};
+
+    #[test]
+    fn deep_cells_start_in_the_midst_of_the_gap() -> Result<(), Box<dyn Error>> {
+        let walls = PeriodicWalls::LevelSet { delta: 0.9 };
+        let space = FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period: 1.0, walls };
+        let (gap, domain) = (space.gap()?, space.domain()?);
+        let settings = SeedSettings::new(300, 1);
+        let found = start_in_part(&gap, &domain, &settings, &mut |_| ControlFlow::Continue(()))?;
+        assert!((found.part - 0.5).abs() < 1e-12, "{}", found.part);
+        // One draw showed that the whole gap is too deep.
+        assert!(matches!(&found.rejected[..], [defects] if !defects.is_empty()));
+        let midst = gap_volume(&gap.narrowed(found.part), &domain);
+        // The quadrature that measures the ground is good to 1e-4.
+        assert!((found.partition.volume() / midst - 1.0).abs() < 1e-4);
+        assert_eq!(found.network.cells().len(), 300);
+        Ok(())
+    }
+}

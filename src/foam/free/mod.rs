@@ -13,6 +13,7 @@
 //! | borders and films that vanish: changes of topology | `flip/` |
 //! | a one-layer foam taken over from its network | `extruded.rs` |
 //! | walls moved apart in stages | `widen.rs` |
+//! | films that slide round a corner between two open faces | `turn.rs` |
 //! | what cells cover of the walls | `outline.rs` |
 //! | angles at corners | `angles.rs` |
 //!
@@ -29,6 +30,7 @@ mod laws;
 mod open;
 mod outline;
 mod relax;
+mod turn;
 mod widen;
 
 pub use angles::{corner_angles, tetrahedral_angle};

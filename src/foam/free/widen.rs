@@ -10,13 +10,14 @@ use super::{
     extruded::taken_over,
     films::films_refined,
     relax::{Begin, FIRST_FINENESS, relaxed_from},
+    turn::{Slide, slide, turned},
 };
 use crate::{
     foam::{
         relax::{DescentStep, Ending, State},
         solve::FactorError,
     },
-    surface::{Gap, LevelSet, WallSide},
+    surface::{Gap, WallSide},
 };
 use glam::DVec3;
 use std::ops::ControlFlow;
@@ -105,8 +106,8 @@ const FINEST_STAGE: usize = 1;
 const MOST_WIDEST: usize = 4;
 /// The force at which a stage ends: topology has settled by then.
 const STAGE_TOLERANCE: f64 = 1e-3;
-/// A film's end that lies beyond a plane by more than this part of the spacing has slid round a corner.
-const SLID: f64 = 0.01;
+/// Films that turn round corners in one stage before that no longer counts as progress.
+const MOST_TURNS: usize = 10;
 
 /// Goes on from a network's foam in a part of `gap` until it is filled.
 ///
@@ -223,7 +224,13 @@ impl Stages<'_> {
             step_limit: STAGE_STEPS.min(MOST_LOST / begin.division.seeds.len()).max(LEAST_STEPS),
             ..*self.settings
         };
-        let (foam, held_up) = self.relaxed(begin, part, &settings)?;
+        let (mut foam, mut held_up) = self.relaxed(begin, part, &settings)?;
+        for _ in 0..MOST_TURNS {
+            let Some(begin) = turned(&foam, &self.gap.narrowed(part), settings.spacing) else { break };
+            let flips = foam.flips;
+            (foam, held_up) = self.relaxed(begin, part, &settings)?;
+            foam.flips += flips;
+        }
         let force = foam.descended.residuals.force;
         let obstacle = obstacle(&foam, settings.spacing).map(|found| match found {
             Obstacle::Interrupted if held_up => Obstacle::Unsettled { force },
@@ -285,8 +292,9 @@ fn moved_apart(foam: &FreeFoam, from: &Gap, to: &Gap) -> Option<Begin> {
 
 /// What keeps a foam from balance; nothing if it is in balance.
 fn obstacle(foam: &FreeFoam, spacing: f64) -> Option<Obstacle> {
-    if let Some(slid) = slid(&foam.division, spacing) {
-        return Some(slid);
+    if let Some(Slide { polygon, place, .. }) = slide(&foam.division, spacing) {
+        let film = &foam.division.polygons[polygon];
+        return Some(Obstacle::Slid { cells: [film.cell, film.neighbour], place });
     }
     match foam.descended.ending {
         Ending::Converged => return None,
@@ -319,19 +327,4 @@ fn obstacle(foam: &FreeFoam, spacing: f64) -> Option<Obstacle> {
     });
     let force = foam.descended.residuals.force;
     border.or(Some(Obstacle::Unsettled { force }))
-}
-
-/// A corner that lies on one plane and beyond another.
-fn slid(division: &Division, spacing: f64) -> Option<Obstacle> {
-    division.polygons.iter().find_map(|film| {
-        let beyond = |image: &&CornerImage| {
-            let corner = division.corners[image.corner];
-            let others = division.planes.iter().enumerate().filter(|(at, _)| Some(*at) != corner.plane);
-            corner.plane.is_some()
-                && others.map(|(_, plane)| plane.value(corner.place)).any(|v| v < -SLID * spacing)
-        };
-        let image = film.corners.iter().find(beyond)?;
-        let place = division.corners[image.corner].place;
-        Some(Obstacle::Slid { cells: [film.cell, film.neighbour], place })
-    })
 }
