@@ -48,7 +48,7 @@ pub enum StartError {
     #[error(transparent)]
     Seeds(#[from] SeedError),
     /// No draw of seeds gave a sound partition.
-    #[error("{attempts} draws of {cells} seeds gave no sound partition of the gap; in the last: {}", list(.defects))]
+    #[error("none of {attempts} draws of {cells} seeds gave a sound partition of the gap; in the last: {}", list(.defects))]
     Unsound {
         /// How many draws.
         attempts: u64,
@@ -87,7 +87,7 @@ pub fn start_in_part(
     let attempts = if depth > DEEP { 1 } else { ATTEMPTS };
     let Failure { error, first, rejected } = match drawn(gap, domain, settings, attempts, progress) {
         Ok(start) => return Ok(start),
-        Err(failure) => failure,
+        Err(failure) => *failure,
     };
     let Some(seeds) = first.filter(|_| rejected[0].iter().all(PartitionDefect::is_of_depth)) else {
         return Err(error);
@@ -125,7 +125,7 @@ fn drawn(
     settings: &SeedSettings,
     attempts: u64,
     progress: &mut Progress<'_>,
-) -> Result<Start, Failure> {
+) -> Result<Start, Box<Failure>> {
     let mut rejected = Vec::new();
     let mut first = None;
     for attempt in 0..attempts {
@@ -144,7 +144,7 @@ fn drawn(
     }
     let defects = rejected.last().cloned().unwrap_or_default();
     let error = StartError::Unsound { attempts, cells: settings.count, defects };
-    Err(Failure { error, first, rejected })
+    Err(Box::new(Failure { error, first, rejected }))
 }
 
 type Divided = (Seeds, Partition, Network);
