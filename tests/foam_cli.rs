@@ -106,7 +106,7 @@ fn bad_input_gets_one_clear_message_and_no_output() -> Tested {
             "too few cells",
         ),
         // Three cells cannot cover the P-surface, whatever the seed.
-        ("--cells 3 --sweeps 20", "no sound partition"),
+        ("--cells 3 --sweeps 20", "sound partition of the gap"),
     ] {
         let home = tempfile::tempdir()?;
         let ended = foam(home.path(), &format!("{arguments} --stop-after partition"))?;
