@@ -111,7 +111,7 @@ fn growth() -> Result<(), Box<dyn Error>> {
     let space = FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period: 1.0, walls };
     let (gap, domain) = (space.gap()?, space.domain()?);
     let mut points = Vec::new();
-    for cells in [64, 128, 256, 512] {
+    for cells in [64, 128, 256, 512, 1000, 2000] {
         let seeds = SeedSettings::new(cells, 1);
         let (until, started) = timed(|| start(&gap, &domain, &seeds, &mut |_| ControlFlow::Continue(())));
         let network = started?.network;

@@ -173,7 +173,7 @@ pub(super) struct FoamArguments {
     pub(super) lloyd: usize,
 
     /// Layers of cells: 1, or 2 as in natural comb, with --cells on each wall
-    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), conflicts_with_all = ["resume", "runs", "stop_after", "anneal", "extrapolate"], help_heading = "Layers")]
+    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), conflicts_with_all = ["resume", "runs", "stop_after", "anneal"], help_heading = "Layers")]
     pub(super) layers: u8,
     /// How the cells of two layers are arranged
     #[arg(long, value_enum, default_value = "annealed", help_heading = "Layers")]

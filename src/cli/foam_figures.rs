@@ -156,10 +156,22 @@ impl Figures {
                 ),
             ));
         }
-        if let Some(Extrapolated { finer, limit, .. }) = self.extrapolated {
-            lines.push(("on a finer mesh", format!("{finer:.10}")));
-            lines.push(("without a mesh", format!("{limit:.10}")));
-        }
+        lines.extend(self.extrapolated.iter().flat_map(extrapolation));
         lines
     }
+}
+
+/// The energies on a finer mesh and without one, for people.
+pub(super) fn extrapolation(Extrapolated { finer, limit, .. }: &Extrapolated) -> [Line; 2] {
+    [("on a finer mesh", format!("{finer:.10}")), ("without a mesh", format!("{limit:.10}"))]
+}
+
+/// What stands in their place where neighbours on a finer mesh are others.
+pub(super) fn no_extrapolation() -> Line {
+    ("on a finer mesh", "no balance with the same neighbours: ask for finer --elements".to_owned())
+}
+
+/// What is said of a foam that is in balance on unevenly spread nodes only.
+pub(super) fn uneven() -> Line {
+    ("nodes", "uneven: no balance was found on even ones; ask for finer --elements".to_owned())
 }

@@ -3,6 +3,7 @@
 
 use super::{
     CliError,
+    foam_figures::{extrapolation, no_extrapolation, uneven},
     foam_relax::{Job, no_pattern},
     foam_run::{self, Line, by_sides},
     foam_settings::FoamSettings,
@@ -15,7 +16,7 @@ use crate::{
         flat_hexagonal_energy,
         free::{self, FreeFoam, FreeSettings, Obstacle, Widened, corner_angles, tetrahedral_angle},
         pattern::pattern_of_free,
-        relax::State,
+        relax::{Extrapolated, State},
         seeds::Seeds,
     },
     report::{
@@ -83,6 +84,10 @@ struct Figures {
     /// The part that was filled.
     part: f64,
     psi6_of_seeds: f64,
+    /// Whether the foam is in balance on evenly spread nodes.
+    nodes_even: bool,
+    /// The energy on elements of half the size, and without a mesh.
+    extrapolated: Option<Extrapolated>,
     ended: String,
 }
 
@@ -137,8 +142,18 @@ pub(super) fn run(
         interrupt::flow()
     });
     let widened = widened.map_err(CliError::failure)?;
+    let extrapolated = match &widened.obstacle {
+        None if origin.settings.extrapolate => Some(
+            free::extrapolate(&widened.foam, origin.gap, &how, &mut |told| {
+                bar.set_message(format!("finer films, force {:.1e}", told.residuals.force));
+                interrupt::flow()
+            })
+            .map_err(CliError::failure)?,
+        ),
+        _ => None,
+    };
     let until = began.elapsed().as_secs_f64();
-    let lines = write(&mut folder, origin, &widened, &record)?;
+    let lines = write(&mut folder, origin, &widened, extrapolated, &record)?;
     let ended = ended(&widened);
     let seconds =
         [seconds, vec![("free topology", until), ("figures", began.elapsed().as_secs_f64() - until)]]
@@ -160,6 +175,7 @@ fn write(
     folder: &mut OutputFolder,
     origin: &Origin<'_>,
     widened: &Widened,
+    extrapolated: Option<Option<Extrapolated>>,
     record: &[StepRecord],
 ) -> Result<Vec<Line>, CliError> {
     let foam = &widened.foam;
@@ -172,7 +188,8 @@ fn write(
         folder.write_json(name, pattern)?;
     }
     let cells = cells(foam, gap, &patterns[0]);
-    let figures = figures(origin, widened, &patterns, &cells)?;
+    let figures =
+        Figures { extrapolated: extrapolated.flatten(), ..figures(origin, widened, &patterns, &cells)? };
     foam_files::write_free_cells(folder, foam, &patterns, &cells)?;
     let surface = free_pieces(foam, gap);
     folder.write("films.vtp", |writer| foam_export::write_vtp(writer, &surface, &cells))?;
@@ -191,7 +208,13 @@ fn write(
         folder.write_bytes(name.as_str(), text.map_err(CliError::mistake)?.as_bytes())?;
     }
     folder.write_json("summary.json", &figures)?;
-    Ok(table(&figures))
+    let finer = match extrapolated {
+        None => Vec::new(),
+        Some(None) => vec![no_extrapolation()],
+        Some(Some(found)) => extrapolation(&found).to_vec(),
+    };
+    let uneven = (!figures.nodes_even).then(uneven);
+    Ok([table(&figures), uneven.into_iter().collect(), finer].concat())
 }
 
 /// What is known of the cells; their sides are those on the lower wall.
@@ -259,6 +282,8 @@ fn figures(
         network_part: origin.network.part,
         part: *part,
         psi6_of_seeds: origin.job.psi6,
+        nodes_even: foam.is_even,
+        extrapolated: None,
         ended: ended(widened),
     })
 }
@@ -272,11 +297,6 @@ fn ended(widened: &Widened) -> String {
     let why = match *obstacle {
         Obstacle::Interrupted => return format!("interrupted after {} steps", widened.steps),
         Obstacle::Law(law) => format!("beyond, {law}"),
-        Obstacle::Leaves { cell, wall, place } => format!(
-            "beyond, cell {cell} is squeezed off the {} wall, {}",
-            if wall == WallSide::Lower { "lower" } else { "upper" },
-            at(place)
-        ),
         Obstacle::Border { cells: [a, b], length, place } => format!(
             "beyond, a border of cells {a} and {b} vanishes {}, {length:.3} cell widths long, and no change of neighbours is possible there",
             at(place)

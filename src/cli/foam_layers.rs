@@ -2,18 +2,19 @@
 
 use super::{
     CliError,
+    foam_figures::{extrapolation, no_extrapolation, uneven},
     foam_run::{Line, by_sides, finished, watched},
     foam_settings::FoamSettings,
     interrupt, progress,
 };
 use crate::{
     foam::{
-        free::{FreeFoam, FreeSettings, corner_angles, relaxed, tetrahedral_angle},
+        free::{self, FreeFoam, FreeSettings, corner_angles, relaxed, tetrahedral_angle},
         layers::{
             Arrangement, Companions, Compared, LayerFigures, NoLayers, charged, companions, divided,
             layer_figures, plane_end, sheets,
         },
-        relax::Ending,
+        relax::{Ending, Extrapolated},
         seeds::SeedError,
         setup::FoamSpace,
     },
@@ -63,6 +64,10 @@ struct Summary<'a> {
     seed: u64,
     first_energy: f64,
     energy: f64,
+    /// Whether the foam is in balance on evenly spread nodes.
+    nodes_even: bool,
+    /// The energy on elements of half the size, and without a mesh.
+    extrapolated: Option<Extrapolated>,
     /// The least energy of ends with plane films, by formula, over one cell's opening.
     plane_end: Option<f64>,
     ended: String,
@@ -116,6 +121,17 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         interrupt::flow()
     });
     let layers = layers.map_err(CliError::failure)?;
+    let is_balanced = layers.descended.ending == Ending::Converged;
+    let extrapolated = match settings.extrapolate && is_balanced {
+        true => Some(
+            free::extrapolate(&layers, &gap, &how, &mut |told| {
+                bar.set_message(format!("finer films, force {:.1e}", told.residuals.force));
+                interrupt::flow()
+            })
+            .map_err(CliError::failure)?,
+        ),
+        false => None,
+    };
     bar.finish_and_clear();
     let figures = layer_figures(&layers.division);
     let sides = [&figures[0].sides[..], &figures[1].sides].concat();
@@ -143,6 +159,8 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         seed: settings.seeds.seed,
         first_energy: layers.first_energy,
         energy: layers.energy,
+        nodes_even: layers.is_even,
+        extrapolated: extrapolated.flatten(),
         plane_end: plane_end(arrangement).map(|end| end.area),
         ended: ended(&layers),
         steps: layers.descended.steps,
@@ -160,6 +178,12 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     };
     folder.write_json("summary.json", &summary)?;
     let mut lines = table(&summary, &layers);
+    lines.extend((is_balanced && !layers.is_even).then(uneven));
+    match extrapolated {
+        None => {}
+        Some(None) => lines.push(no_extrapolation()),
+        Some(Some(found)) => lines.extend(extrapolation(&found)),
+    }
     for (name, figures) in [("lower layer", &figures[0]), ("upper layer", &figures[1])] {
         lines.push((name, in_words(figures)));
     }

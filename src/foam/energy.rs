@@ -82,6 +82,13 @@ pub(crate) fn jet(point: &ShapePoint, nodes: &[DVec3]) -> (DVec3, DVec3, DVec3) 
     (x, a, b)
 }
 
+/// The normal of an element at one of its nodes, as long as the element is large.
+pub(crate) fn node_normal(shape: Shape, node: usize, nodes: &[DVec3]) -> DVec3 {
+    let (u, v) = shape.node_at(node);
+    let (_, a, b) = jet(&shape.at(u, v, 1.0), nodes);
+    a.cross(b)
+}
+
 /// The area of an element.
 #[must_use]
 pub(crate) fn element_area(shape: Shape, nodes: &[DVec3]) -> f64 {

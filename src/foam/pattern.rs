@@ -1,7 +1,7 @@
 //! From a partition or a relaxed foam to the pattern that is compared with comb.
 
 use super::{
-    domain::{Axis, Domain},
+    domain::Axis,
     free::{FreeFoam, WallLine},
     partition::{Beyond, Partition, PartitionCell, Side},
     relax::State,
@@ -35,7 +35,8 @@ pub fn pattern_of_partition(
 ) -> Result<CellPattern, Vec<PatternDefect>> {
     let cells =
         partition.cells().iter().map(|cell| pattern_cell(cell, gap, place)).collect::<IndexVec<_, _>>();
-    CellPattern::new("L", surroundings(gap, partition.domain()), cells)
+    let is_cut = partition.domain().axes.iter().any(|axis| matches!(axis, Axis::Walls { .. }));
+    CellPattern::new("L", within(is_cut, || gap.middle().euler_characteristic()), cells)
 }
 
 /// The pattern of a relaxed foam's cells. Its neighbours are the same at every height; lengths and areas are those of the
@@ -64,26 +65,10 @@ pub fn pattern_of_state(
                 length: length(&state.side_line(side, row), &state.side_line(network.next(side), row)),
             }
         });
-        let walls: Vec<CellWall> = walls.collect();
-        let (sides, status) = counted(&walls);
-        Cell {
-            position,
-            normal: surface.normal(position),
-            sides,
-            status,
-            confidence: 1.0,
-            area: fan_area(position, &state.outline_at(id, row)),
-            gauss_curvature: Some(surface.curvature(position).gauss),
-            walls,
-        }
+        cell_on(surface, position, &state.outline_at(id, row), walls.collect())
     };
     let cells: IndexVec<CellId, Cell> = network.cells().map(cell).collect();
-    let surroundings = if network.planes().is_empty() {
-        Surroundings::Closed { euler_characteristic: network.euler_characteristic() }
-    } else {
-        Surroundings::Open
-    };
-    CellPattern::new("L", surroundings, cells)
+    CellPattern::new("L", within(!network.planes().is_empty(), || network.euler_characteristic()), cells)
 }
 
 /// The pattern of the cells of a foam of free topology on one wall. Lengths are in the surface's unit, `L`.
@@ -105,33 +90,16 @@ pub fn pattern_of_free(
         let midst =
             if outline.is_empty() { foam.division.seeds[id] } else { outline.iter().sum::<DVec3>() / count };
         let (position, surface) = placed(midst, gap, PatternPlace::Wall(wall));
-        let walls: Vec<CellWall> = lines
-            .iter()
-            .map(|line| CellWall {
-                neighbour: line.neighbour.map(CellId::from_index),
-                shift: line.shift,
-                length: length(&line.points, &[]),
-            })
-            .collect();
-        let (sides, status) = counted(&walls);
-        Cell {
-            position,
-            normal: surface.normal(position),
-            sides,
-            status,
-            confidence: 1.0,
-            area: fan_area(position, &outline),
-            gauss_curvature: Some(surface.curvature(position).gauss),
-            walls,
-        }
+        let walls = lines.iter().map(|line| CellWall {
+            neighbour: line.neighbour.map(CellId::from_index),
+            shift: line.shift,
+            length: length(&line.points, &[]),
+        });
+        cell_on(surface, position, &outline, walls.collect())
     };
     let cells: IndexVec<CellId, Cell> = foam.outlines(gap, wall).into_iter().enumerate().map(cell).collect();
-    let surroundings = if foam.division.planes.is_empty() {
-        Surroundings::Closed { euler_characteristic: gap.middle().euler_characteristic() }
-    } else {
-        Surroundings::Open
-    };
-    CellPattern::new("L", surroundings, cells)
+    let is_cut = !foam.division.planes.is_empty();
+    CellPattern::new("L", within(is_cut, || gap.middle().euler_characteristic()), cells)
 }
 
 /// The number of sides and the status of a cell with these walls. One that ends at a plane is cut, like a cell at the edge of
@@ -169,11 +137,28 @@ fn fan_area(centre: DVec3, outline: &[DVec3]) -> f64 {
     0.5 * outline.iter().zip(next).map(triangle).sum::<f64>()
 }
 
-fn surroundings(gap: &Gap, domain: &Domain) -> Surroundings {
-    if domain.axes.iter().any(|axis| matches!(axis, Axis::Walls { .. })) {
-        return Surroundings::Open;
+/// A cell of a foam at a place of a surface, within its outline there.
+fn cell_on(surface: &dyn LevelSet, position: DVec3, outline: &[DVec3], walls: Vec<CellWall>) -> Cell {
+    let (sides, status) = counted(&walls);
+    Cell {
+        position,
+        normal: surface.normal(position),
+        sides,
+        status,
+        confidence: 1.0,
+        area: fan_area(position, outline),
+        gauss_curvature: Some(surface.curvature(position).gauss),
+        walls,
     }
-    Surroundings::Closed { euler_characteristic: gap.middle().euler_characteristic() }
+}
+
+/// What the cells lie in: planes cut them off, or they close over the whole surface.
+fn within(is_cut: bool, euler_characteristic: impl FnOnce() -> i32) -> Surroundings {
+    if is_cut {
+        Surroundings::Open
+    } else {
+        Surroundings::Closed { euler_characteristic: euler_characteristic() }
+    }
 }
 
 fn pattern_cell(cell: &PartitionCell, gap: &Gap, place: PatternPlace) -> Cell {
@@ -183,18 +168,8 @@ fn pattern_cell(cell: &PartitionCell, gap: &Gap, place: PatternPlace) -> Cell {
         PatternPlace::Wall(wall) => &cell.on_walls[wall as usize],
     };
     let (position, surface) = placed(cell.seed, gap, place);
-    let walls: Vec<CellWall> = outline.iter().map(pattern_wall).collect();
-    let (sides, status) = counted(&walls);
-    Cell {
-        position,
-        normal: surface.normal(position),
-        sides,
-        status,
-        confidence: 1.0,
-        area: fan_area(position, &outline.iter().map(|side| side.start).collect::<Vec<_>>()),
-        gauss_curvature: Some(surface.curvature(position).gauss),
-        walls,
-    }
+    let corners: Vec<DVec3> = outline.iter().map(|side| side.start).collect();
+    cell_on(surface, position, &corners, outline.iter().map(pattern_wall).collect())
 }
 
 fn pattern_wall(side: &Side) -> CellWall {

@@ -253,9 +253,9 @@ impl PeriodicWalls {
 
 impl fmt::Display for PeriodicWalls {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::LevelSet { delta } => write!(f, "walls Φ = ±{delta}"),
-            Self::Parallel { gap } => write!(f, "parallel walls, gap {gap}"),
+        match *self {
+            Self::LevelSet { delta } => write!(f, "walls Φ = ±{}", short(delta)),
+            Self::Parallel { gap } => write!(f, "parallel walls, gap {}", short(gap)),
         }
     }
 }
@@ -279,7 +279,7 @@ impl fmt::Display for FoamSpace {
                     PeriodicSurface::Gyroid => "gyroid",
                     PeriodicSurface::Diamond => "diamond",
                 };
-                write!(f, "{name}, period {period}, {walls}")
+                write!(f, "{name}, period {}, {walls}", short(period))
             }
             Self::Piece { period, walls, low, high, open_faces } => {
                 let [x, y, z] = [0, 1, 2].map(|axis| 0.5 * f64::from(high[axis] - low[axis]));
@@ -287,18 +287,31 @@ impl fmt::Display for FoamSpace {
                     OpenFaces::Walls => "closed by plane walls",
                     OpenFaces::Periodic => "periodic where it can be",
                 };
-                write!(f, "Schwarz P, {x} × {y} × {z} periods of {period}, {faces}; {walls}")
+                write!(f, "Schwarz P, {x} × {y} × {z} periods of {}, {faces}; {walls}", short(period))
             }
-            Self::Box { sides: [x, y], height } => write!(f, "planes {height} apart in a box of {x} × {y}"),
-            Self::Sphere { radii: [inner, outer] } => write!(f, "spheres of radius {inner} and {outer}"),
-            Self::Torus { ring, tubes: [inner, outer] } => {
+            Self::Box { sides, height } => {
+                let ([x, y], height) = (sides.map(short), short(height));
+                write!(f, "planes {height} apart in a box of {x} × {y}")
+            }
+            Self::Sphere { radii } => {
+                let [inner, outer] = radii.map(short);
+                write!(f, "spheres of radius {inner} and {outer}")
+            }
+            Self::Torus { ring, tubes } => {
+                let [ring, inner, outer] = [ring, tubes[0], tubes[1]].map(short);
                 write!(f, "tori of ring {ring}, tubes {inner} and {outer}")
             }
-            Self::Plane { periods: [x, y], height } => {
+            Self::Plane { periods, height } => {
+                let ([x, y], height) = (periods.map(short), short(height));
                 write!(f, "planes {height} apart, periods {x} and {y}")
             }
         }
     }
+}
+
+/// A length to seven digits, for people: parts of gaps have all that a double can hold.
+fn short(length: f64) -> f64 {
+    format!("{length:.6e}").parse().unwrap_or(length)
 }
 
 fn positive(what: &'static str, value: f64) -> Result<(), SpaceError> {
@@ -320,6 +333,14 @@ mod tests {
     use super::*;
     use crate::surface::WallSide;
     use glam::DVec3;
+
+    #[test]
+    fn a_space_is_told_in_few_digits() {
+        let walls = PeriodicWalls::LevelSet { delta: 0.858454 };
+        let space = FoamSpace::Periodic { kind: PeriodicSurface::SchwarzP, period: 200.0, walls };
+        assert_eq!(space.to_string(), "Schwarz P, period 200, walls Φ = ±0.858454");
+        assert_eq!(space.narrowed(1.0 / 3.0).to_string(), "Schwarz P, period 200, walls Φ = ±0.2861513");
+    }
 
     #[test]
     fn walls_lie_where_they_were_asked_for() -> Result<(), SpaceError> {

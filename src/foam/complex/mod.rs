@@ -9,7 +9,7 @@ mod shape;
 mod strips;
 
 pub use shape::Shape;
-pub(crate) use shape::{CurvePoint, MOST_NODES, ShapePoint, curve_points, quadratic};
+pub(crate) use shape::{CurvePoint, MOST_NODES, ShapePoint, curve_points, gauss, quadratic};
 pub(in crate::foam) use strips::coons;
 pub use strips::{NoExtrusion, Strips};
 
@@ -75,6 +75,13 @@ pub struct Node {
     pub walls: Vec<WallId>,
     /// Its freedom.
     pub motion: Motion,
+}
+
+impl Node {
+    /// Whether it lies inside a film, neither on its borders nor on a wall.
+    pub(crate) fn is_within_film(&self) -> bool {
+        matches!(self.motion, Motion::Inner(_)) && self.walls.is_empty()
+    }
 }
 
 /// A curved element of a film.

@@ -113,6 +113,29 @@ impl Shape {
         }
     }
 
+    /// The pairs of nodes that lie beside each other.
+    #[must_use]
+    pub(crate) fn pairs(self) -> &'static [[usize; 2]] {
+        match self {
+            Self::Quad9 => &[
+                [0, 1],
+                [1, 2],
+                [3, 4],
+                [4, 5],
+                [6, 7],
+                [7, 8],
+                [0, 3],
+                [3, 6],
+                [1, 4],
+                [4, 7],
+                [2, 5],
+                [5, 8],
+            ],
+            Self::Tri6 => &[[0, 3], [3, 1], [1, 4], [4, 2], [2, 5], [5, 0], [3, 4], [4, 5], [5, 3]],
+            Self::Tri3 => &[[0, 1], [1, 2], [2, 0]],
+        }
+    }
+
     /// Plane triangles between the nodes, counter-clockwise, as pictures show the element.
     #[must_use]
     pub fn triangles(self) -> &'static [[usize; 3]] {

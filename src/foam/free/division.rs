@@ -2,8 +2,11 @@
 
 use super::{Side, films::side_between};
 use crate::{
-    foam::convert::as_f64,
-    index::checked_u32,
+    foam::{
+        complex::{NodeId, Places},
+        convert::as_f64,
+    },
+    index::{Id, checked_u32},
     surface::{CutPlane, Gap, Period, Wall, WallSide},
 };
 use glam::{DVec3, IVec3};
@@ -91,6 +94,15 @@ impl Division {
     #[must_use]
     pub fn place(&self, image: CornerImage) -> DVec3 {
         self.corners[image.corner].place + self.period.translation(IVec3::from_array(image.shift))
+    }
+
+    /// The same with its corners where a descent has brought their nodes.
+    pub(super) fn at(&self, places: &Places) -> Self {
+        let mut division = self.clone();
+        for (at, corner) in division.corners.iter_mut().enumerate() {
+            corner.place = places[NodeId::from_index(at)];
+        }
+        division
     }
 
     /// The edges that a polygon has on a wall: the number of their first corner.

@@ -5,21 +5,22 @@ use super::{
     Division, FreeFilms, Side,
     division::{Corner, CornerImage, Polygon, Stacking},
     films::films_refined,
+    finer::{laid_within, piece},
 };
 use crate::{
     foam::{
-        complex::NodeImage,
+        complex::{NodeImage, quadratic},
         network::{EdgeId, VertexId},
         relax::State,
     },
     index::Id,
     surface::{Gap, WallSide},
 };
-use glam::IVec3;
+use glam::{DVec3, IVec3};
 use std::collections::BTreeMap;
 
 /// The cells of a network's foam in `gap`, the part that it fills, and their films with `fineness` elements on each half side,
-/// where the network's lie.
+/// at least one, where the network's lie.
 pub(super) fn taken_over(state: &State, gap: &Gap, fineness: usize) -> (Division, FreeFilms) {
     let (network, strips) = (&state.network, state.strips);
     let last = strips.rows() - 1;
@@ -42,8 +43,31 @@ pub(super) fn taken_over(state: &State, gap: &Gap, fineness: usize) -> (Division
         polygons,
     };
     division.euler = division.euler_of(WallSide::Lower);
-    let films = films_refined(&division, gap, fineness, &lines(state, gap));
+    let mut films = films_refined(&division, gap, fineness, &lines(state, gap));
+    let edges: Vec<EdgeId> = network.films().collect();
+    laid_within(&mut films, fineness, |film, quad, u, v| on_strip(state, edges[film.index()], quad, u, v));
     (division, films)
+}
+
+/// The place on a network's film in its polygon's quadrilateral at a corner, in the frame of the cell on its left.
+fn on_strip(state: &State, edge: EdgeId, quad: usize, u: f64, v: f64) -> DVec3 {
+    let (network, strips) = (&state.network, state.strips);
+    // Corners go along the lower wall and back along the upper one.
+    let (along, through) = match quad {
+        0 => (0.5 * u, 0.5 * v),
+        1 => (1.0 - 0.5 * v, 0.5 * u),
+        2 => (1.0 - 0.5 * u, 1.0 - 0.5 * v),
+        _ => (0.5 * v, 1.0 - 0.5 * u),
+    };
+    let ((i, u), (j, v)) = (piece(along, strips.along), piece(through, strips.through));
+    let ((columns, _), (rows, _)) = (quadratic(u), quadratic(v));
+    let back = network.cell_shift(edge.half_edges()[0]);
+    let place = |column: usize, row: usize| {
+        let image = strips.film_node(network, edge, 2 * i + column, 2 * j + row);
+        state.places[image.node] + network.period().translation(image.shift - back)
+    };
+    let weighted = |at: usize| columns[at % 3] * rows[at / 3] * place(at % 3, at / 3);
+    (0..9).map(weighted).sum()
 }
 
 fn corner(vertex: VertexId, wall: WallSide) -> usize {

@@ -7,11 +7,11 @@
 //! (M. S. Floater, "Mean value coordinates", CAGD 20, 2003), so that a film goes with its borders and its wall. After a change
 //! of topology, borders and films that were not touched keep their places.
 
-use super::{Division, Polygon, division::CornerImage, flip::Renumbering};
+use super::{Division, Polygon, division::CornerImage, flip::Renumbering, line::Line};
 use crate::foam::{
     complex::{
         Complex, Element, Film, Motion, Node, NodeId, NodeImage, Places, Region, RegionId, RegionImage,
-        RegionKind, Shape, WallId, quadratic,
+        RegionKind, Shape, WallId,
     },
     convert::as_f64,
 };
@@ -82,7 +82,8 @@ pub(super) fn films_after(
             corners[new] = Some(old);
         }
     }
-    build(division, gap, fineness, Some(&Before { films: before, corners, polygons: &renumbering.polygons }))
+    let before = Before { films: before, corners, polygons: &renumbering.polygons, evenly: false };
+    build(division, gap, fineness, Some(&before))
 }
 
 fn build(division: &Division, gap: &Gap, fineness: usize, before: Option<&Before<'_>>) -> FreeFilms {
@@ -113,8 +114,14 @@ pub(super) fn films_refined(
     fineness: usize,
     before: &FreeFilms,
 ) -> FreeFilms {
-    let corners = (0..division.corners.len()).map(Some).collect();
-    build(division, gap, fineness, Some(&Before { films: before, corners, polygons: &[] }))
+    build(division, gap, fineness, Some(&Before::of_lines(division, before)))
+}
+
+/// Builds the complex anew with nodes at even distances along the lines where they are.
+pub(super) fn films_evened(division: &Division, gap: &Gap, fineness: usize, before: &FreeFilms) -> FreeFilms {
+    let polygons: Vec<Option<usize>> = (0..division.polygons.len()).map(Some).collect();
+    let before = Before { polygons: &polygons, evenly: true, ..Before::of_lines(division, before) };
+    build(division, gap, fineness, Some(&before))
 }
 
 /// Films before a change of topology or of the mesh.
@@ -124,19 +131,25 @@ struct Before<'a> {
     corners: Vec<Option<usize>>,
     /// The old number of each polygon that has kept its corners.
     polygons: &'a [Option<usize>],
+    /// Whether parts of a side are those of its length, not of its nodes.
+    evenly: bool,
 }
 
-impl Before<'_> {
+impl<'a> Before<'a> {
+    /// Films between the same corners, of which only the lines are taken over.
+    fn of_lines(division: &Division, films: &'a FreeFilms) -> Self {
+        let corners = (0..division.corners.len()).map(Some).collect();
+        Self { films, corners, polygons: &[], evenly: false }
+    }
+
     /// The place at `part` of the way along a side that was there.
     fn on_side(&self, (first, last, shift): Side, part: f64) -> Option<DVec3> {
         let key = (self.corners[first]?, self.corners[last]?, shift);
         let nodes = self.films.borders.get(&key).or_else(|| self.films.wall_edges.get(&key))?;
-        let pieces = (nodes.len() - 1) / 2;
-        let along = part * as_f64(pieces);
-        let piece = (0..pieces).rfind(|&piece| as_f64(piece) <= along)?;
-        let place = |at: usize| self.films.complex.place(&self.films.places, nodes[2 * piece + at]);
-        let (weights, _) = quadratic(along - as_f64(piece));
-        Some((0..3).map(|at| weights[at] * place(at)).sum())
+        let places: Vec<DVec3> =
+            nodes.iter().map(|&node| self.films.complex.place(&self.films.places, node)).collect();
+        let line = Line::new(&places);
+        Some(line.at(if self.evenly { line.at_length(part) } else { line.at_node(part) }))
     }
 
     /// The places inside a film that was there, last to first.

@@ -9,8 +9,11 @@
 //! | the laws: cells in one piece, patches on walls, Euler's numbers | `laws.rs` |
 //! | slivers among their sides opened | `open.rs` |
 //! | the film complex: each polygon as curved quadrilaterals round its middle | `films.rs` |
+//! | the same on finer elements | `finer.rs` |
+//! | places along borders | `line.rs` |
 //! | the descent to least energy at given volumes | `relax.rs` |
 //! | borders and films that vanish: changes of topology | `flip/` |
+//! | nodes spread evenly in balance | `even.rs` |
 //! | a one-layer foam taken over from its network | `extruded.rs` |
 //! | walls moved apart in stages | `widen.rs` |
 //! | films that slide round a corner between two open faces | `turn.rs` |
@@ -23,10 +26,13 @@
 
 mod angles;
 mod division;
+mod even;
 mod extruded;
 mod films;
+mod finer;
 mod flip;
 mod laws;
+mod line;
 mod open;
 mod outline;
 mod relax;
@@ -36,6 +42,7 @@ mod widen;
 pub use angles::{corner_angles, tetrahedral_angle};
 pub use division::{Corner, CornerImage, Division, Polygon, Stacking, spacing};
 pub use films::{FreeFilms, Side, free_films};
+pub use finer::extrapolate;
 pub use laws::{Unlawful, unlawful};
 pub use outline::WallLine;
 pub use relax::{FreeFoam, FreeSettings, relaxed};

@@ -3,7 +3,9 @@
 use super::{
     Division, FreeFilms, Unlawful,
     division::spacing,
+    even::films_even,
     films::{Side, films_after, films_refined, side_between},
+    finer::films_finer,
     flip::{Cluster, Moves},
     free_films,
     laws::unlawful,
@@ -54,6 +56,9 @@ pub struct FreeFoam {
     pub unlawful: Vec<Unlawful>,
     /// Cells that were squeezed off a wall of theirs, where the descent ended: there is no foam nearby in which all keep theirs.
     pub leaving: Vec<(usize, WallSide)>,
+    /// Whether nodes were found to lie evenly in balance, so that the energy is that of the foam and its mesh, whatever way led
+    /// there. A foam that is in balance on uneven nodes only may owe it to them.
+    pub is_even: bool,
 }
 
 /// How a foam of free topology is relaxed.
@@ -70,6 +75,9 @@ pub struct FreeSettings {
     /// Whether vanishing borders change the topology; otherwise the foam ends where they vanish, so that an arrangement stays
     /// what it is.
     pub changes_topology: bool,
+    /// Whether nodes are spread evenly along borders and within films at the end, which makes the energy's last digits those
+    /// of the foam, whatever way led to it.
+    pub spreads_evenly: bool,
 }
 
 impl FreeSettings {
@@ -82,7 +90,14 @@ impl FreeSettings {
     /// The coarsest films, to a force of 1e-10, with changes of topology.
     #[must_use]
     pub const fn new(spacing: f64) -> Self {
-        Self { fineness: 1, spacing, tolerance: 1e-10, step_limit: 600, changes_topology: true }
+        Self {
+            fineness: 1,
+            spacing,
+            tolerance: 1e-10,
+            step_limit: 600,
+            changes_topology: true,
+            spreads_evenly: true,
+        }
     }
 }
 
@@ -108,6 +123,10 @@ const SQUEEZED_OFF: f64 = 0.2;
 /// So many such steps on end, with nothing to go, and the films are laid anew; at most so often.
 const MOST_HELD_UP: usize = 4;
 const MOST_SPREADS: usize = 12;
+/// Nodes of a foam in balance are spread evenly until that changes its energy by less than this, relative, which is not
+/// printed; each time leaves less than a tenth of what there was to even out, if no topology changes.
+const EVEN: f64 = 1e-12;
+const MOST_EVENED: usize = 8;
 /// By how much each flip of the same bodies lowers their threshold, so that none flips back and forth for ever.
 const WEARINESS: f64 = 0.6;
 
@@ -115,7 +134,7 @@ const WEARINESS: f64 = 0.6;
 const VOLUME_TOLERANCE: f64 = 1e-10;
 
 /// The coarsest films.
-pub(super) const FIRST_FINENESS: usize = 0;
+const FIRST_FINENESS: usize = 0;
 /// The force at which the first descent, on the coarsest films, ends: topology has settled by then.
 const FIRST_TOLERANCE: f64 = 1e-3;
 
@@ -171,6 +190,8 @@ pub(super) fn relaxed_from(
         unlawful: Vec::new(),
         flips: 0,
         spreads: 0,
+        balanced: None,
+        evened: 0,
     };
     let mut steps = 0;
     loop {
@@ -187,10 +208,17 @@ pub(super) fn relaxed_from(
         let flipped = goes_on && vanish && settings.changes_topology && run.flip(&shrinking);
         let spread = goes_on && !flipped && stuck && run.spread();
         let refined = goes_on && !flipped && !spread && run.refine();
-        if !(flipped || spread || refined) {
-            let descended = Descended { steps, ..descended };
-            return Ok(run.end(&descent, descended, first_energy, shrinking.leaving));
+        if flipped || spread || refined {
+            continue;
         }
+        let descended = Descended { steps, ..descended };
+        let foam = run.end(&descent, descended, first_energy, shrinking.leaving);
+        let is_balanced = descended.ending == Ending::Converged;
+        if !(goes_on && is_balanced && run.evens(&foam)) {
+            let is_lost = !is_balanced && !asked_to_stop && foam.leaving.is_empty();
+            return Ok(run.balanced.filter(|_| is_lost).unwrap_or(foam));
+        }
+        run.balanced = Some(foam);
     }
 }
 
@@ -208,6 +236,9 @@ struct Run<'a> {
     flips: usize,
     /// How often films were laid anew.
     spreads: usize,
+    /// The foam in balance before its nodes were spread evenly, and how often they were.
+    balanced: Option<FreeFoam>,
+    evened: usize,
 }
 
 /// Sides that can change the topology, the shortest first.
@@ -299,7 +330,7 @@ impl Run<'_> {
         if exhausted || !now.iter().any(|(side, &length)| short(side, length)) {
             return Vanishing::default();
         }
-        let division = self.division_at(told.descent.places());
+        let division = self.division.at(told.descent.places());
         let moves = Moves::new(&division, self.gap, self.settings.spacing);
         let mut found: Vec<(f64, Side)> = now
             .iter()
@@ -338,16 +369,7 @@ impl Run<'_> {
     /// Takes over where a descent has brought the nodes.
     fn keep(&mut self, descent: &Descent) {
         self.films.places = descent.places().clone();
-        self.division = self.division_at(descent.places());
-    }
-
-    /// The division with its corners where their nodes are.
-    fn division_at(&self, places: &Places) -> Division {
-        let mut division = self.division.clone();
-        for (at, corner) in division.corners.iter_mut().enumerate() {
-            corner.place = places[NodeId::from_index(at)];
-        }
-        division
+        self.division = self.division.at(descent.places());
     }
 
     /// Changes the topology at these sides, as far as they do not disturb each other. Gives whether anything changed.
@@ -386,26 +408,37 @@ impl Run<'_> {
         if self.settings.changes_topology {
             open(&mut self.division, self.gap, SLIVER * self.settings.spacing);
         }
-        self.films = if self.spreads.is_multiple_of(2) {
-            films_refined(&self.division, self.gap, self.fineness, &self.films)
-        } else {
-            free_films(&self.division, self.gap, self.fineness)
+        self.films = match self.spreads % 3 {
+            1 => films_even(&self.division, self.gap, self.fineness, &self.films),
+            2 => free_films(&self.division, self.gap, self.fineness),
+            _ => films_refined(&self.division, self.gap, self.fineness, &self.films),
         };
         self.spreads <= MOST_SPREADS
+    }
+
+    /// Spreads the nodes of a foam in balance evenly, if they were not before. Gives whether anything changed.
+    fn evens(&mut self, foam: &FreeFoam) -> bool {
+        if !self.settings.spreads_evenly || foam.is_even || self.evened >= MOST_EVENED {
+            return false;
+        }
+        self.evened += 1;
+        self.films = films_even(&self.division, self.gap, self.fineness, &self.films);
+        true
     }
 
     /// Goes on to the films that were asked for. Gives whether there are others to go on to.
     fn refine(&mut self) -> bool {
         let coarser = self.fineness < self.settings.fineness;
         if coarser {
+            let before = (&self.films, self.fineness);
+            self.films = films_finer(&self.division, self.gap, self.settings.fineness, before);
             self.fineness = self.settings.fineness;
-            self.films = films_refined(&self.division, self.gap, self.fineness, &self.films);
         }
         coarser
     }
 
     fn end(
-        self,
+        &self,
         descent: &Descent,
         descended: Descended,
         first_energy: f64,
@@ -417,18 +450,22 @@ impl Run<'_> {
             let lengths = self.lengths(descent);
             lengths.into_iter().filter(|(_, length)| *length < VANISHING * self.settings.spacing).collect()
         };
+        let energy = descent.energy();
+        let is_even = descended.ending == Ending::Converged
+            && self.balanced.as_ref().is_some_and(|before| (energy / before.energy - 1.0).abs() < EVEN);
         FreeFoam {
             first_energy,
-            energy: descent.energy(),
+            energy,
+            is_even,
             pressures: descent.pressures().clone(),
             volumes: descent.volumes(),
             descended,
             flips: self.flips,
             vanishing,
             leaving,
-            division: self.division,
-            films: self.films,
-            unlawful: self.unlawful,
+            division: self.division.clone(),
+            films: self.films.clone(),
+            unlawful: self.unlawful.clone(),
             fineness: self.fineness,
         }
     }

@@ -2,13 +2,14 @@
 
 use super::{
     extruded::taken_over,
-    relax::{Begin, FIRST_FINENESS, relaxed_from},
+    line::Line,
+    relax::{Begin, relaxed_from},
     *,
 };
 use crate::{
     foam::{
         pattern::pattern_of_free,
-        relax::{Descent, DescentSettings, Ending, RelaxSettings, State, Stop, relax},
+        relax::{self, Descent, DescentSettings, DescentStep, Ending, RelaxSettings, State, Stop, relax},
         seeds::SeedSettings,
         setup::{FoamSpace, PeriodicSurface, PeriodicWalls},
         start::start,
@@ -51,13 +52,16 @@ static WIDE: LazyLock<(Widened, Gap)> = LazyLock::new(|| {
 fn films_from_wall_to_wall_have_the_energy_of_their_network() -> Result<(), Box<dyn Error>> {
     let (state, gap, energy) = &*NETWORK;
     let narrow = gap.narrowed(state.part);
-    let (division, films) = taken_over(state, &narrow, FIRST_FINENESS);
+    let (division, films) = taken_over(state, &narrow, 1);
     assert_eq!(unlawful(&division), []);
-    let begin = Begin { division, films, fineness: FIRST_FINENESS, pressures: state.pressures.clone() };
+    // Both meshes have two elements along each side of a film, and the same nodes.
+    let same = crate::foam::energy::energy(&films.complex, &films.places) / energy - 1.0;
+    assert!(same.abs() < 1e-12, "{same}");
+    let begin = Begin { division, films, fineness: 1, pressures: state.pressures.clone() };
     let foam = relaxed_from(begin, &narrow, &FreeSettings::of(state), &mut |_| ControlFlow::Continue(()))?;
     assert_eq!((foam.descended.ending, foam.flips), (Ending::Converged, 0));
     assert_eq!((foam.twisted_cells(), foam.division.inner_corners()), (0, 0));
-    // Both meshes have two elements along each side of a film; with so few cells their errors are some 1e-4 each.
+    // Nodes within films are spread otherwise than the network's; with so few cells the error of the mesh is some 1e-4.
     assert!((foam.energy / energy - 1.0).abs() < 1.5e-4, "{} {energy}", foam.energy);
     let differ = |(&a, &b): (&f64, &f64)| (a - b).abs();
     let mean = |pressures: &[f64]| pressures.iter().sum::<f64>() / 32.0;
@@ -67,6 +71,18 @@ fn films_from_wall_to_wall_have_the_energy_of_their_network() -> Result<(), Box<
     let worst = free.iter().zip(&shifted).map(differ).fold(0.0, f64::max);
     // Pressures range over ±2.
     assert!(worst < 2e-2, "{worst}");
+    // Without a mesh both are the same.
+    let goes_on = &mut |_: &DescentStep<'_>| ControlFlow::Continue(());
+    let free = extrapolate(&foam, &narrow, &FreeSettings::of(state), goes_on)?.ok_or("no balance")?;
+    let network =
+        relax::extrapolate(state, &narrow, &RelaxSettings::default(), &mut || ControlFlow::Continue(()))?;
+    let network = network.ok_or("no balance of the network")?;
+    let apart = |a: f64, b: f64| (a / b - 1.0).abs();
+    assert!(
+        apart(free.limit, network.limit)
+            < 0.05 * apart(free.energy, free.limit).min(apart(*energy, network.limit)),
+        "{free:?} {network:?}"
+    );
     Ok(())
 }
 
@@ -129,7 +145,7 @@ fn borders_meet_at_the_tetrahedral_angle_as_the_mesh_is_refined() -> Result<(), 
         angles.iter().map(|angle| (angle - tetrahedral_angle()).abs()).sum::<f64>() / count
     };
     let foam = &wide.foam;
-    let films = films::films_refined(&foam.division, gap, 2, &foam.films);
+    let films = finer::films_finer(&foam.division, gap, 2, (&foam.films, 1));
     let (division, pressures) = (foam.division.clone(), foam.pressures.clone());
     let begin = Begin { division, films, fineness: 2, pressures };
     let settings = FreeSettings { fineness: 2, tolerance: 1e-6, ..FreeSettings::of(&NETWORK.0) };
@@ -138,6 +154,45 @@ fn borders_meet_at_the_tetrahedral_angle_as_the_mesh_is_refined() -> Result<(), 
     let (coarse, fine) = (off(foam), off(&finer));
     // Some borders are as short as the coarse elements, so that the order of tangents, two, is not seen yet.
     assert!(fine < 0.1 && fine < 0.7 * coarse, "{coarse} {fine}");
+    Ok(())
+}
+
+#[test]
+fn the_energy_is_the_foams_wherever_its_nodes_lay() -> Result<(), Box<dyn Error>> {
+    let (wide, gap) = &*WIDE;
+    let foam = &wide.foam;
+    let mut films = foam.films.clone();
+    for nodes in films.borders.values().chain(films.wall_edges.values()) {
+        let places: Vec<_> = nodes.iter().map(|&node| films.complex.place(&films.places, node)).collect();
+        let (line, last) = (Line::new(&places), nodes.len() - 1);
+        for (at, image) in nodes.iter().enumerate().take(last).skip(1) {
+            let part = crate::foam::convert::as_f64(at) / crate::foam::convert::as_f64(last);
+            films.places[image.node] = line.at(line.at_length(part + 0.2 * part * (1.0 - part)));
+        }
+    }
+    let energy = |spreads_evenly| -> Result<f64, Box<dyn Error>> {
+        let (division, films) = (foam.division.clone(), films.clone());
+        let begin = Begin { division, films, fineness: 1, pressures: foam.pressures.clone() };
+        let settings = FreeSettings { spreads_evenly, ..FreeSettings::of(&NETWORK.0) };
+        let again = relaxed_from(begin, gap, &settings, &mut |_| ControlFlow::Continue(()))?;
+        assert_eq!((again.descended.ending, again.flips), (Ending::Converged, 0));
+        Ok(again.energy)
+    };
+    let off = |energy: f64| (energy / foam.energy - 1.0).abs();
+    // Spreading ends at a change of 1e-12.
+    assert!(off(energy(true)?) < 1e-11, "{:e}", off(energy(true)?));
+    assert!(off(energy(false)?) > 1e-7, "{:e}", off(energy(false)?));
+    Ok(())
+}
+
+#[test]
+fn finer_films_lie_on_the_coarser_ones() -> Result<(), Box<dyn Error>> {
+    let (wide, gap) = &*WIDE;
+    let foam = &wide.foam;
+    let films = finer::films_finer(&foam.division, gap, 2, (&foam.films, 1));
+    let laid = crate::foam::energy::energy(&films.complex, &films.places);
+    // The same surface but where films end: the ends of these large ones lie off the curved walls between their nodes.
+    assert!((laid / foam.energy - 1.0).abs() < 2e-3, "{:e}", laid / foam.energy - 1.0);
     Ok(())
 }
 

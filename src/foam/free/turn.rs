@@ -87,7 +87,7 @@ mod tests {
         let settings = RelaxSettings::default();
         let relaxed = relax(started.network, &gap, &settings, &mut |_| ControlFlow::Continue(()))?;
         let spacing = FreeSettings::of(&relaxed.state).spacing;
-        let (mut division, _) = taken_over(&relaxed.state, &gap, 0);
+        let (mut division, _) = taken_over(&relaxed.state, &gap, 1);
         assert!(slide(&division, spacing).is_none() && unlawful(&division).is_empty());
 
         // The film whose end is next to a corner is pushed past it.

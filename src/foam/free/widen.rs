@@ -7,9 +7,9 @@
 use super::{
     Division, FreeFilms, FreeFoam, FreeSettings, Unlawful,
     division::CornerImage,
+    even::films_even,
     extruded::taken_over,
-    films::films_refined,
-    relax::{Begin, FIRST_FINENESS, relaxed_from},
+    relax::{Begin, relaxed_from},
     turn::{Slide, slide, turned},
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
         relax::{DescentStep, Ending, State},
         solve::FactorError,
     },
-    surface::{Gap, WallSide},
+    surface::Gap,
 };
 use glam::DVec3;
 use std::ops::ControlFlow;
@@ -27,15 +27,6 @@ use std::ops::ControlFlow;
 pub enum Obstacle {
     /// A change of topology would break a law.
     Law(Unlawful),
-    /// What a cell covers of a wall shrinks to nothing.
-    Leaves {
-        /// The cell.
-        cell: usize,
-        /// The wall.
-        wall: WallSide,
-        /// Where.
-        place: DVec3,
-    },
     /// A border vanishes and no change of topology is possible there.
     Border {
         /// The cells at it.
@@ -91,17 +82,18 @@ pub struct WideningStep<'a> {
 /// failed, and again by more after each that settled.
 const GROWTH: f64 = 1.1;
 /// A stage that widens by less is not tried.
-const LEAST_GROWTH: f64 = 1.02;
-/// Newton steps of a stage on the coarsest films: those that settle take three to a hundred.
+const LEAST_GROWTH: f64 = 1.005;
+/// Newton steps of a stage: those that settle take three to a hundred.
 const STAGE_STEPS: usize = 150;
 /// Steps times cells of stages in vain, after which no wider gap is tried: a few minutes' work.
 const MOST_LOST: usize = 150_000;
+/// A stage of however many cells has so many steps: those without changes of topology settle in fewer.
 const LEAST_STEPS: usize = 30;
 /// Steps of which less than this part could be taken are held up; after so many of them a stage is given up.
 const HELD_UP: f64 = 0.05;
 const MOST_HELD_UP: usize = 20;
-/// The fineness of stages after the first that does not settle on the coarsest films.
-const FINEST_STAGE: usize = 1;
+/// The fineness of stages: the network's own films are as fine. On coarser ones long and thin films fold.
+const FINENESS: usize = 1;
 /// Foams that are tried on the final films, the widest first, until one settles.
 const MOST_WIDEST: usize = 4;
 /// The force at which a stage ends: topology has settled by then.
@@ -120,35 +112,26 @@ pub fn widened(
     progress: &mut dyn FnMut(&WideningStep<'_>) -> ControlFlow<()>,
 ) -> Result<Widened, FactorError> {
     let narrow = gap.narrowed(state.part);
-    let begin = |fineness| {
-        let (division, films) = taken_over(state, &narrow, fineness);
-        Begin { division, films, fineness, pressures: state.pressures.clone() }
-    };
+    let (division, films) = taken_over(state, &narrow, FINENESS);
+    let begin = Begin { division, films, fineness: FINENESS, pressures: state.pressures.clone() };
     let mut stages = Stages { gap, settings, steps: 0, flips: 0, progress };
-    let mut fineness = FIRST_FINENESS;
-    let (mut first, mut obstacle) = stages.coarse(begin(fineness), state.part)?;
-    if obstacle.is_some() && obstacle != Some(Obstacle::Interrupted) {
-        fineness = FINEST_STAGE;
-        (first, obstacle) = stages.coarse(begin(fineness), state.part)?;
-    }
+    let (first, mut obstacle) = stages.coarse(begin, state.part)?;
     stages.flips += first.flips;
     let mut settled = vec![Settled { foam: first, part: state.part, flips: stages.flips }];
+    if obstacle.is_some() {
+        return widest(stages, settled, obstacle);
+    }
     let (mut growth, mut lost) = (GROWTH, 0);
     while let Some(Settled { foam, part, .. }) = settled.last()
         && *part < 1.0
         && obstacle != Some(Obstacle::Interrupted)
     {
-        if growth < GROWTH && fineness < FINEST_STAGE {
-            // Long and thin films fold on the coarsest elements first.
-            (fineness, growth) = (FINEST_STAGE, GROWTH);
-        }
         if growth < LEAST_GROWTH || lost > MOST_LOST {
             break;
         }
         let before = stages.steps;
         let (part, wider) = (*part, (part * growth).min(1.0));
         let tried = moved_apart(foam, &gap.narrowed(part), &gap.narrowed(wider))
-            .map(|begin| refined(begin, &gap.narrowed(wider), fineness))
             .and_then(|begin| stages.coarse(begin, wider).ok());
         match tried {
             Some((foam, None)) => {
@@ -186,7 +169,8 @@ fn widest(
         let Some(Settled { foam, part, flips }) = settled.pop() else { break };
         let FreeFoam { fineness, division, films, pressures, .. } = foam;
         stages.flips = flips;
-        let foam = stages.relaxed(Begin { division, films, fineness, pressures }, part, stages.settings)?.0;
+        let begin = Begin { division, films, fineness, pressures };
+        let foam = stages.relaxed(begin, part, stages.settings, usize::MAX)?.0;
         let found = self::obstacle(&foam, stages.settings.spacing);
         let flips = flips + foam.flips;
         let ends = found.is_none() || found == Some(Obstacle::Interrupted);
@@ -222,13 +206,14 @@ impl Stages<'_> {
             fineness: begin.fineness,
             tolerance: STAGE_TOLERANCE,
             step_limit: STAGE_STEPS.min(MOST_LOST / begin.division.seeds.len()).max(LEAST_STEPS),
+            spreads_evenly: false,
             ..*self.settings
         };
-        let (mut foam, mut held_up) = self.relaxed(begin, part, &settings)?;
+        let (mut foam, mut held_up) = self.relaxed(begin, part, &settings, MOST_HELD_UP)?;
         for _ in 0..MOST_TURNS {
             let Some(begin) = turned(&foam, &self.gap.narrowed(part), settings.spacing) else { break };
             let flips = foam.flips;
-            (foam, held_up) = self.relaxed(begin, part, &settings)?;
+            (foam, held_up) = self.relaxed(begin, part, &settings, MOST_HELD_UP)?;
             foam.flips += flips;
         }
         let force = foam.descended.residuals.force;
@@ -239,38 +224,29 @@ impl Stages<'_> {
         Ok((foam, obstacle))
     }
 
-    /// A foam in a part of the gap, and whether it was given up because its steps were held up.
+    /// A foam in a part of the gap, and whether it was given up because more than so many of its steps were held up.
     fn relaxed(
         &mut self,
         begin: Begin,
         part: f64,
         settings: &FreeSettings,
+        most_held_up: usize,
     ) -> Result<(FreeFoam, bool), FactorError> {
         let Self { gap, flips, progress, .. } = self;
-        let is_stage = settings.step_limit <= STAGE_STEPS;
         let mut held_up = 0;
         let foam = relaxed_from(begin, &gap.narrowed(part), settings, &mut |step| {
             held_up += usize::from(step.fraction < HELD_UP);
             match progress(&WideningStep { part, flips: *flips, step }) {
-                ControlFlow::Continue(()) if is_stage && held_up > MOST_HELD_UP => ControlFlow::Break(()),
+                ControlFlow::Continue(()) if held_up > most_held_up => ControlFlow::Break(()),
                 flow => flow,
             }
         })?;
         self.steps += foam.descended.steps;
-        Ok((foam, held_up > MOST_HELD_UP))
+        Ok((foam, held_up > most_held_up))
     }
 }
 
-/// The same foam on films of another fineness, if that is another.
-fn refined(begin: Begin, gap: &Gap, fineness: usize) -> Begin {
-    if begin.fineness == fineness {
-        return begin;
-    }
-    let films = films_refined(&begin.division, gap, fineness, &begin.films);
-    Begin { films, fineness, ..begin }
-}
-
-/// The foam with its nodes at the same part of the way between other walls; `None` if a node finds no place.
+/// The foam with its nodes at the same part of the way between other walls, and spread evenly; `None` if a node finds no place.
 fn moved_apart(foam: &FreeFoam, from: &Gap, to: &Gap) -> Option<Begin> {
     let walls = |gap: &Gap| gap.walls().each_ref().map(|wall| wall.level);
     let ([low, high], [wider_low, wider_high]) = (walls(from), walls(to));
@@ -287,6 +263,7 @@ fn moved_apart(foam: &FreeFoam, from: &Gap, to: &Gap) -> Option<Begin> {
     for corner in &mut division.corners {
         corner.place = moved(corner.place)?;
     }
+    let films = films_even(&division, to, foam.fineness, &films);
     Some(Begin { division, films, fineness: foam.fineness, pressures: foam.pressures.clone() })
 }
 
@@ -298,20 +275,13 @@ fn obstacle(foam: &FreeFoam, spacing: f64) -> Option<Obstacle> {
     }
     match foam.descended.ending {
         Ending::Converged => return None,
-        Ending::Halted
-            if foam.vanishing.is_empty() && foam.leaving.is_empty() && foam.unlawful.is_empty() =>
-        {
+        Ending::Halted if foam.vanishing.is_empty() && foam.unlawful.is_empty() => {
             return Some(Obstacle::Interrupted);
         }
         _ => {}
     }
     if let Some(&law) = foam.unlawful.first() {
         return Some(Obstacle::Law(law));
-    }
-    if let Some(&(cell, wall)) = foam.leaving.first() {
-        let rim = &foam.division.rims(wall)[cell];
-        let place = rim.first().map_or(foam.division.seeds[cell], |edge| foam.division.place(edge.from));
-        return Some(Obstacle::Leaves { cell, wall, place });
     }
     let border = foam.vanishing.iter().min_by(|a, b| a.1.total_cmp(&b.1)).and_then(|&(side, length)| {
         let [start, end] = [(side.0, [0; 3]), (side.1, side.2)]

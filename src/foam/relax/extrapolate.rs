@@ -22,8 +22,15 @@ pub struct Extrapolated {
 /// The error of quadratic elements falls by this factor when their size is halved.
 const FALL: f64 = 16.0;
 
-/// Relaxes a settled foam on a mesh of half the element size and extrapolates (L. F. Richardson, 1911). `None` if the finer
-/// mesh does not settle or other cells touch on it.
+impl Extrapolated {
+    /// From the energies on a mesh and on one of twice as many elements both ways (L. F. Richardson, 1911).
+    pub(in crate::foam) fn of(energy: f64, finer: f64) -> Self {
+        Self { energy, finer, limit: finer + (finer - energy) / (FALL - 1.0) }
+    }
+}
+
+/// Relaxes a settled foam on a mesh of half the element size and extrapolates. `None` if the finer mesh does not settle or
+/// other cells touch on it.
 ///
 /// # Errors
 /// [`RelaxError`] as for the relaxation itself.
@@ -45,6 +52,5 @@ pub fn extrapolate(
     if !matches!(finer.stop, Stop::Converged { .. }) || finer.state.flips != state.flips {
         return Ok(None);
     }
-    let (energy, finer) = (of(state), of(&finer.state));
-    Ok(Some(Extrapolated { energy, finer, limit: finer + (finer - energy) / (FALL - 1.0) }))
+    Ok(Some(Extrapolated::of(of(state), of(&finer.state))))
 }

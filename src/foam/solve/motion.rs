@@ -5,7 +5,7 @@ use super::layout::Layout;
 use crate::{
     foam::{
         complex::{Complex, Motion, Node, NodeId, Places},
-        energy::{jet, outer},
+        energy::{node_normal, outer},
     },
     index::IndexVec,
 };
@@ -94,9 +94,7 @@ impl Frames {
             nodes.extend(element.nodes.iter().map(|&image| complex.place(places, image)));
             for (at, image) in element.nodes.iter().enumerate() {
                 if matches!(complex.nodes[image.node].motion, Motion::Inner(_)) {
-                    let (u, v) = element.shape.node_at(at);
-                    let (_, a, b) = jet(&element.shape.at(u, v, 1.0), &nodes);
-                    axes[image.node] += a.cross(b);
+                    axes[image.node] += node_normal(element.shape, at, &nodes);
                 }
             }
             for edge in element.shape.edges() {

@@ -92,7 +92,7 @@ fn one_layer() -> Result<(Division, Gap, f64), Box<dyn Error>> {
     let started = start(&gap, &domain, &SeedSettings::new(18, 4), &mut |_| ControlFlow::Continue(()))?;
     let settings = RelaxSettings::default();
     let relaxed = relax(started.network, &gap, &settings, &mut |_| ControlFlow::Continue(()))?;
-    let division = taken_over(&relaxed.state, &gap, 0).0;
+    let division = taken_over(&relaxed.state, &gap, 1).0;
     Ok((division, gap, FreeSettings::of(&relaxed.state).spacing))
 }
 
