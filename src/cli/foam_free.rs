@@ -298,13 +298,20 @@ fn ended(widened: &Widened) -> String {
         Obstacle::Interrupted => return format!("interrupted after {} steps", widened.steps),
         Obstacle::Law(law) => format!("beyond, {law}"),
         Obstacle::Border { cells: [a, b], length, place } => format!(
-            "beyond, a border of cells {a} and {b} vanishes {}, {length:.3} cell widths long, and no change of neighbours is possible there",
+            "beyond, a border of cells {a} and {b} vanishes {}, {length:.3} cell widths long, and no change of neighbours there leads to a balance",
             at(place)
         ),
         Obstacle::Slid { cells: [a, b], place } => format!(
             "beyond, the film between cells {a} and {b} slides round a corner between two open faces, {}",
             at(place)
         ),
+        Obstacle::Uneven if widened.part >= 1.0 => {
+            return "in balance on unevenly spread nodes only, which may be one of the mesh; ask for finer --elements"
+                .to_owned();
+        }
+        Obstacle::Uneven => {
+            "beyond, films are in balance on unevenly spread nodes only: ask for finer --elements".to_owned()
+        }
         Obstacle::Unsettled { force } => format!("beyond, films come to no balance (force {force:.1e})"),
     };
     format!(

@@ -23,6 +23,14 @@ pub struct Corner {
     pub plane: Option<usize>,
 }
 
+impl Corner {
+    /// Whether four cells meet there, inside the gap.
+    #[must_use]
+    pub const fn is_inside(&self) -> bool {
+        self.wall.is_none() && self.plane.is_none()
+    }
+}
+
 /// A corner of a film's polygon, seen from the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CornerImage {
@@ -133,7 +141,7 @@ impl Division {
     /// The corners inside the gap, where four cells meet.
     #[must_use]
     pub fn inner_corners(&self) -> usize {
-        self.corners.iter().filter(|corner| corner.wall.is_none() && corner.plane.is_none()).count()
+        self.corners.iter().filter(|corner| corner.is_inside()).count()
     }
 
     /// Whether each cell touches the lower and the upper wall.

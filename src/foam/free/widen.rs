@@ -27,7 +27,7 @@ use std::ops::ControlFlow;
 pub enum Obstacle {
     /// A change of topology would break a law.
     Law(Unlawful),
-    /// A border vanishes and no change of topology is possible there.
+    /// A border vanishes and no change of topology there leads to a balance.
     Border {
         /// The cells at it.
         cells: [usize; 2],
@@ -43,6 +43,8 @@ pub enum Obstacle {
         /// Where.
         place: DVec3,
     },
+    /// Films are in balance on unevenly spread nodes only.
+    Uneven,
     /// Newton steps do not come to a balance.
     Unsettled {
         /// The largest force left, in units of tension × spacing.
@@ -171,7 +173,9 @@ fn widest(
         stages.flips = flips;
         let begin = Begin { division, films, fineness, pressures };
         let foam = stages.relaxed(begin, part, stages.settings, usize::MAX)?.0;
-        let found = self::obstacle(&foam, stages.settings.spacing);
+        let is_uneven = stages.settings.spreads_evenly && !foam.is_even;
+        let found =
+            self::obstacle(&foam, stages.settings.spacing).or_else(|| is_uneven.then_some(Obstacle::Uneven));
         let flips = flips + foam.flips;
         let ends = found.is_none() || found == Some(Obstacle::Interrupted);
         // What stopped a wider foam stands in the way of the whole gap.
