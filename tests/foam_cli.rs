@@ -280,3 +280,45 @@ fn annealing_gives_the_same_files_with_any_number_of_threads() -> Tested {
     assert_eq!(written("1")?, written("2")?);
     Ok(())
 }
+
+/// The enclosure of the paper: its gap is too wide for films that all reach from wall to wall.
+const PAPER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/enclosures/paper/recipe.toml");
+
+#[test]
+fn a_wide_gap_is_filled_by_films_of_free_topology_with_any_number_of_threads() -> Tested {
+    let written = |jobs: &str| -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
+        let home = tempfile::tempdir()?;
+        let ended = foam(home.path(), &format!("--recipe {PAPER} --cells 32 -j {jobs}"))?;
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        ["summary.json", "cells.csv", "films.vtp", "pattern-lower-wall.json", "pattern-upper-wall.json"]
+            .iter()
+            .map(|name| Ok(fs::read(home.path().join("out").join(name))?))
+            .collect()
+    };
+    let files = written("1")?;
+    assert_eq!(files, written("2")?);
+    let summary: Value = serde_json::from_slice(&files[0])?;
+    let number = |name: &str| summary[name].as_f64().ok_or_else(|| format!("no {name}"));
+    assert!(summary["nodes_even"] == true && summary["unstable_directions"] == 0, "{summary}");
+    assert!(number("part")? >= 1.0 && number("network_part")? < 1.0, "{summary}");
+    // What the relaxation promises.
+    assert!(number("residual")? < 1e-10 && number("volume_error")? < 1e-10, "{summary}");
+    assert!(number("twisted_cells")? > 0.0 && number("lowest_eigenvalue")? > 0.0, "{summary}");
+    Ok(())
+}
+
+#[test]
+fn a_gap_too_wide_for_a_foam_ends_with_the_widest_that_is_in_balance_and_says_so() -> Tested {
+    let home = tempfile::tempdir()?;
+    let ended = foam(home.path(), &format!("--recipe {PAPER} --cells 16"))?;
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("no foam of one layer in so wide a gap") && said.contains("beyond, "), "{said}");
+    let summary = json(&home.path().join("out/summary.json"))?;
+    // A foam on even nodes goes before one in a wider gap that is in balance on uneven ones only.
+    assert_eq!((&summary["nodes_even"], &summary["unstable_directions"]), (&true.into(), &0.into()));
+    let part = summary["part"].as_f64().ok_or("no part")?;
+    assert!(part < 1.0 && part >= summary["network_part"].as_f64().ok_or("no network")?, "{summary}");
+    assert!(summary["residual"].as_f64().ok_or("no residual")? < 1e-10);
+    Ok(())
+}
