@@ -303,6 +303,14 @@ fn a_wide_gap_is_filled_by_films_of_free_topology_with_any_number_of_threads() -
     assert!(number("part")? >= 1.0 && number("network_part")? < 1.0, "{summary}");
     // What the relaxation promises.
     assert!(number("residual")? < 1e-10 && number("volume_error")? < 1e-10, "{summary}");
+    // Every cell has a number of sides on a wall, or ends at a plane there.
+    for wall in 0..2 {
+        let counts = summary["side_counts"][wall].as_array().ok_or("no sides")?;
+        let complete: u64 = counts.iter().filter_map(Value::as_u64).sum();
+        assert_eq!(Some(32 - complete), summary["cut_patches"][wall].as_u64(), "{summary}");
+    }
+    let cells = String::from_utf8_lossy(&files[1]);
+    assert_eq!(cells.lines().filter(|line| line.contains(",cut,")).count() as u64, summary["cut_cells"]);
     assert!(number("twisted_cells")? > 0.0 && number("lowest_eigenvalue")? > 0.0, "{summary}");
     Ok(())
 }

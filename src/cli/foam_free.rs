@@ -26,7 +26,7 @@ use crate::{
         folder::OutputFolder,
     },
     surface::{Gap, WallSide},
-    tessellation::CellPattern,
+    tessellation::{Cell, CellPattern},
 };
 use anyhow::anyhow;
 use indicatif::ProgressBar;
@@ -48,9 +48,11 @@ struct Figures {
     energy_over_flat: f64,
     /// How many cells have 0, 1, 2 … sides on the lower and on the upper wall.
     side_counts: [Vec<usize>; 2],
-    /// How many cells end at planes that cut the gap off; they have no number of sides.
+    /// How many cells end at planes that cut the gap off.
     cut_cells: usize,
-    /// Σ (6 − n) on each wall over the cells that are not cut.
+    /// How many of them end there on the lower and on the upper wall; they have no number of sides on that wall.
+    cut_patches: [usize; 2],
+    /// Σ (6 − n) on each wall over the cells that are not cut there.
     charge: [i64; 2],
     /// Cells that touch other cells on one wall than on the other.
     twisted_cells: usize,
@@ -261,6 +263,7 @@ fn figures(
         energy_over_flat: foam.energy / flat,
         side_counts: patterns.each_ref().map(CellPattern::side_counts),
         cut_cells: foam.division.cut().into_iter().filter(|&cut| cut).count(),
+        cut_patches: patterns.each_ref().map(cut_patches),
         charge: patterns.each_ref().map(CellPattern::charge),
         twisted_cells: foam.twisted_cells(),
         cells_off_walls: [0, 1]
@@ -286,6 +289,12 @@ fn figures(
         extrapolated: None,
         ended: ended(widened),
     })
+}
+
+/// How many cells end at planes on a wall.
+fn cut_patches(pattern: &CellPattern) -> usize {
+    let ends_there = |cell: &&Cell| cell.walls.iter().any(|wall| wall.neighbour.is_none());
+    pattern.cells.iter().filter(ends_there).count()
 }
 
 /// How the widening ended, for people.
@@ -325,13 +334,14 @@ fn table(figures: &Figures) -> Vec<Line> {
         (Some(mean), Some(worst)) => format!("{mean:+.3}° in the mean, {worst:.2}° at most"),
         _ => "-".to_owned(),
     };
-    let cut = match figures.cut_cells {
-        0 => String::new(),
-        cells => format!(", cut: {cells}"),
-    };
-    let [lower, upper] = figures.side_counts.each_ref().map(|counts| {
-        let complete = by_sides(counts);
-        if complete.is_empty() { cut.trim_start_matches(", ").to_owned() } else { complete + &cut }
+    let [lower, upper] = [0, 1].map(|wall| {
+        let complete = by_sides(&figures.side_counts[wall]);
+        let cut = match figures.cut_patches[wall] {
+            0 => String::new(),
+            cells => format!("cut: {cells}"),
+        };
+        let parts = [complete, cut].into_iter().filter(|part| !part.is_empty());
+        parts.collect::<Vec<_>>().join(", ")
     });
     vec![
         ("space", figures.space.clone()),

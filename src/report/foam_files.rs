@@ -84,7 +84,9 @@ struct FreeCellRow {
 }
 
 /// Writes `cells.csv` of a foam of free topology: centres in the unit of the surface, sides on the lower and on the upper wall,
-/// films, status, volume, pressure less the mean, Gaussian curvature of the middle surface. `patterns` are those of the walls.
+/// films, status, volume, pressure less the mean, Gaussian curvature of the middle surface. `patterns` are those of the walls. A
+/// cell that ends at a plane anywhere is cut; it has a number of sides on a wall where it does not, none where it does, nor on
+/// a wall that it does not touch.
 ///
 /// # Errors
 /// [`OutputError`] if the file cannot be written.
@@ -94,6 +96,7 @@ pub fn write_free_cells(
     patterns: &[CellPattern; 2],
     figures: &CellFigures,
 ) -> Result<(), OutputError> {
+    let cut = foam.division.cut();
     let mut films = vec![0; foam.division.seeds.len()];
     for film in &foam.division.polygons {
         films[film.cell] += 1;
@@ -112,7 +115,7 @@ pub fn write_free_cells(
                 sides_lower: lower.sides,
                 sides_upper: upper.sides,
                 films,
-                status: lower.status,
+                status: if cut[index] { CellStatus::Cut } else { CellStatus::Complete },
                 volume: figures.volumes[index],
                 pressure: figures.pressures[index],
                 gauss_curvature: figures.gauss_curvature[index],

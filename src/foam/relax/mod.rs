@@ -170,7 +170,8 @@ pub fn relax(
 }
 
 /// Relaxes the foam that `network` starts in a `part` of `gap`, and widens that to the whole of it: for a network that is
-/// sound only between nearer walls.
+/// sound only between nearer walls. Where a foam that starts in the whole of it comes to no balance, as deep cells do, it starts
+/// between nearer walls as well.
 ///
 /// # Errors
 /// As [`relax`].
@@ -182,7 +183,15 @@ pub fn relax_widening(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Relaxed, RelaxError> {
     let shares = shares(&network, settings.shares.as_deref())?;
-    resume(first_state(network, part, gap, shares)?, gap, settings, progress)
+    let first = first_state(network.clone(), part, gap, shares.clone())?;
+    let is_whole = first.part >= 1.0;
+    let relaxed = resume(first, gap, settings, progress)?;
+    if !(is_whole && matches!(relaxed.stop, Stop::Stalled { .. })) {
+        return Ok(relaxed);
+    }
+    let widened = widen::widen(narrow_state(network, part, gap, shares)?, gap, settings, progress)?;
+    let is_better = !matches!(widened.stop, Stop::Stalled { .. } | Stop::StepLimit { .. });
+    Ok(if is_better { widened } else { relaxed })
 }
 
 /// The coarse films of a network, from wall to wall of a part of the gap; of a smaller one in its midst where its walls are too
@@ -195,12 +204,20 @@ fn first_state(
 ) -> Result<State, NoExtrusion> {
     match laid(network.clone(), &gap.narrowed(part), shares.clone()) {
         Ok(state) if !widen::is_steep(&state) => Ok(State { part, ..state }),
-        _ => {
-            let part = widen::FIRST_PART * part;
-            let narrow = laid(network, &gap.narrowed(part), shares)?;
-            Ok(State { part, ..narrow })
-        }
+        _ => narrow_state(network, part, gap, shares),
     }
+}
+
+/// The coarse films of a network in the midst of a part of the gap.
+fn narrow_state(
+    network: Network,
+    part: f64,
+    gap: &Gap,
+    shares: IndexVec<CellId, f64>,
+) -> Result<State, NoExtrusion> {
+    let part = widen::FIRST_PART * part;
+    let narrow = laid(network, &gap.narrowed(part), shares)?;
+    Ok(State { part, ..narrow })
 }
 
 fn laid(network: Network, gap: &Gap, shares: IndexVec<CellId, f64>) -> Result<State, NoExtrusion> {

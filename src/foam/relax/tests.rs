@@ -118,6 +118,27 @@ fn a_gap_is_widened_as_far_as_there_is_a_foam_and_the_pinch_is_told() -> Result<
     Ok(())
 }
 
+/// Films between planes are cylinders whatever the height, but with cells of five and seven sides among hexagons they are no
+/// minimum where the planes lie more than four or five widths of a cell apart: the foam is had between nearer ones then.
+#[test]
+fn a_flat_foam_too_deep_for_its_cells_is_had_between_nearer_walls() -> Result<(), Box<dyn Error>> {
+    let flat = |height| foam(FoamSpace::Plane { periods: [8.0, 8.0], height }, 64, &meshed(2, 1));
+    let (deep, _) = flat(6.0)?;
+    let Stop::TooWide { part, .. } = deep.stop else { panic!("{:?} with {:?}", deep.stop, deep.residuals) };
+    assert!((2.0..5.0).contains(&(6.0 * part)), "{part}");
+    assert!(deep.residuals.force < 1e-10 && deep.unstable == 0, "{:?}", deep.residuals);
+    let (shallow, gap) = flat(0.5)?;
+    let per_height = |relaxed: &Relaxed, gap: &Gap, height: f64| {
+        let complex = relaxed.state.strips.complex(&relaxed.state.network, gap);
+        energy(&complex, &relaxed.state.places) / height
+    };
+    let narrowed = FoamSpace::Plane { periods: [8.0, 8.0], height: 6.0 }.gap()?.narrowed(part);
+    let ratio = per_height(&deep, &narrowed, 6.0 * part) / per_height(&shallow, &gap, 0.5);
+    // Forces of 1e-10 leave the energy at its least to rounding.
+    assert!((ratio - 1.0).abs() < 1e-11, "{ratio}");
+    Ok(())
+}
+
 /// N = 20 on a sphere is one that plain starts miss by 0.3 %; disturbances find the table's.
 #[test]
 fn annealing_finds_the_least_partition_of_a_sphere_that_plain_starts_miss() -> Result<(), Box<dyn Error>> {
