@@ -168,21 +168,21 @@ pub(super) struct FoamArguments {
     /// The temperature at its end, in units of d² [default: 0.0001]
     #[arg(long, value_name = "T", allow_negative_numbers = true, help_heading = "Cells")]
     pub(super) cold: Option<f64>,
-    /// Lloyd steps after the annealing and the polish
+    /// Lloyd steps after the annealing and the polish, at most 1000
     #[arg(long, value_name = "COUNT", default_value_t = 0, help_heading = "Cells")]
     pub(super) lloyd: usize,
 
     /// Layers of cells: 1, or 2 as in natural comb, with --cells on each wall
     #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), conflicts_with_all = ["resume", "runs", "stop_after", "anneal"], help_heading = "Layers")]
     pub(super) layers: u8,
-    /// How the cells of two layers are arranged
-    #[arg(long, value_enum, default_value = "annealed", help_heading = "Layers")]
-    pub(super) pattern: foam_layers::PatternName,
+    /// How the cells of two layers are arranged [default: annealed]
+    #[arg(long, value_enum, help_heading = "Layers")]
+    pub(super) pattern: Option<foam_layers::PatternName>,
 
     /// Quadratic elements along each film and from wall to wall [default: 2,2]
     #[arg(long, value_name = "M,K", value_delimiter = ',', help_heading = "Relaxation")]
     pub(super) elements: Option<Vec<usize>>,
-    /// The largest force at the end, in units of tension × cell width [default: 1e-11]
+    /// The largest force at the end, in units of tension × cell width [default: 1e-10]
     #[arg(long, value_name = "FORCE", allow_negative_numbers = true, help_heading = "Relaxation")]
     pub(super) tolerance: Option<f64>,
     /// Disturb the settled foam so many times, by random T1s and by shaking, and keep what is lower
@@ -204,7 +204,7 @@ pub(super) struct FoamArguments {
     /// Threads; the results do not depend on it [default: all]
     #[arg(short = 'j', long, value_name = "J", help_heading = "Run")]
     pub(super) jobs: Option<usize>,
-    /// Write the relaxed foam into the folder as a datafile of Surface Evolver, under this name
+    /// Write the relaxed foam into the folder as a datafile of Surface Evolver, under this name, as in foam.fe
     #[arg(long, value_name = "NAME", help_heading = "Run")]
     pub(super) write_fe: Option<String>,
     /// The folder for the results
@@ -261,7 +261,8 @@ pub(super) fn foam(arguments: &FoamArguments) -> Result<(), CliError> {
     threads.install(|| match resumed {
         Some(checkpoint) => foam_relax::resume(*checkpoint, settings),
         None if arguments.layers == 2 => {
-            foam_layers::run(&settings, arguments.pattern, arguments.elements.is_some())
+            let pattern = arguments.pattern.unwrap_or(foam_layers::PatternName::Annealed);
+            foam_layers::run(&settings, pattern, arguments.elements.is_some())
         }
         None if settings.runs > 1 => foam_batch::run(&settings),
         None => foam_run::run(&settings),

@@ -301,27 +301,48 @@ fn figures(bubble: &Bubble, landing: &Landing, thin: &ThinGap, modes: &[f64]) ->
             format!("curvatures {:.6e}, {:.6e}", landing.curvatures[0], landing.curvatures[1]),
         ),
         ("lowest shape modes", modes),
-        ("the place is", verdict(bubble, landing)),
+        ("the place is", verdict(bubble, landing, thin.height)),
     ]
 }
 
 /// What kind of place it is.
-fn verdict(bubble: &Bubble, landing: &Landing) -> String {
+fn verdict(bubble: &Bubble, landing: &Landing, height: f64) -> String {
     let rigid = match landing.rigid {
         0 => "",
         1 => ", free to slide along one direction",
         _ => ", free to slide everywhere",
     };
-    let unstable = landing.falling + bubble.unstable_shapes;
     // The force on the coarse mesh beside the curvature of the landscape: an offset far below the size of the bubble.
     let still =
         landing.force <= 1e-6 * bubble.energy.max(bubble.pressure * bubble.volume) / bubble.volume.cbrt();
-    let kind = match (still, unstable) {
-        (false, _) => return "no equilibrium: the walls push".to_owned(),
-        (true, 0) => "a minimum".to_owned(),
-        (true, count) => format!("a saddle or a maximum: {count} falling directions"),
+    if !still {
+        return "no equilibrium: the walls push".to_owned();
+    }
+    let kind = match landing.falling {
+        0 if bubble.unstable_shapes == 0 => "a minimum".to_owned(),
+        0 => "no minimum".to_owned(),
+        count => format!("a saddle or a maximum: {}", falling(count)),
     };
-    kind + rigid
+    let shape = match bubble.unstable_shapes {
+        0 => String::new(),
+        count if is_slender(bubble, height) => format!(
+            "; its shape has {}: the gap is wider than half its girth, and it would pinch off (Plateau, Rayleigh)",
+            falling(count)
+        ),
+        count => format!("; its shape has {} with the centre held", falling(count)),
+    };
+    kind + rigid + &shape
+}
+
+fn falling(count: usize) -> String {
+    if count == 1 { "1 falling direction".to_owned() } else { format!("{count} falling directions") }
+}
+
+/// Whether a cylinder of this volume in a gap of that height is longer than half its girth, from where on it is unstable between
+/// walls on which its ends slide (J. Plateau, 1873; Lord Rayleigh, 1878).
+fn is_slender(bubble: &Bubble, height: f64) -> bool {
+    let radius = (bubble.volume / (std::f64::consts::PI * height)).sqrt();
+    height > std::f64::consts::PI * radius
 }
 
 fn landscape(

@@ -215,7 +215,8 @@ fn write(
         Some(None) => vec![no_extrapolation()],
         Some(Some(found)) => extrapolation(&found).to_vec(),
     };
-    let uneven = (!figures.nodes_even).then(uneven);
+    let is_interrupted = widened.obstacle == Some(Obstacle::Interrupted);
+    let uneven = (!figures.nodes_even && !is_interrupted).then(uneven);
     Ok([table(&figures), uneven.into_iter().collect(), finer].concat())
 }
 

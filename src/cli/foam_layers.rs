@@ -191,7 +191,13 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         lines.extend(in_figures(&defects));
     }
     lines.push(("time", format!("{:.1} s", summary.seconds)));
-    finished(folder, lines)
+    let ended = summary.ended.clone();
+    finished(folder, lines)?;
+    // An arrangement that has a name may be no foam; cells that were sown at random are to become one.
+    if is_balanced || arrangement != Arrangement::Annealed {
+        return Ok(());
+    }
+    Err(CliError::failure(anyhow!("the two layers are in no balance: {ended}")))
 }
 
 fn as_f64(count: usize) -> f64 {
@@ -274,6 +280,14 @@ fn in_words(figures: &LayerFigures) -> String {
     format!("sides {}; end films {}", by_sides(&figures.side_counts), by_sides(&figures.end_counts))
 }
 
+fn in_contact(correlation: f64) -> String {
+    if correlation.is_finite() {
+        format!("correlation {correlation:+.3}")
+    } else {
+        "no correlation".to_owned()
+    }
+}
+
 /// How the layers' defects sit to each other.
 fn in_figures(defects: &Companions) -> Vec<Line> {
     let chance = |compared: &Compared| {
@@ -288,7 +302,7 @@ fn in_figures(defects: &Companions) -> Vec<Line> {
             "defects",
             format!("{} in the lower layer, {} in the upper", defects.defects[0], defects.defects[1]),
         ),
-        ("charges that touch", format!("correlation {:+.3}", defects.contact_correlation)),
+        ("charges that touch", in_contact(defects.contact_correlation)),
         ("charges over each other", chance(&defects.correlation)),
         ("nearest defect opposite", chance(&defects.nearest)),
     ]

@@ -33,6 +33,9 @@ const MOST_PARTITION_CELLS: usize = 200_000;
 /// The most runs of a batch.
 const MOST_RUNS: u64 = 100_000;
 
+/// The most Lloyd steps.
+const MOST_LLOYD: usize = 1000;
+
 /// The most threads.
 const MOST_JOBS: usize = 1024;
 
@@ -125,6 +128,8 @@ impl FoamSettings {
         };
         let relax = relax(arguments, &mut faults);
         faults.extend(too_much(arguments, cells));
+        faults.extend(idle(arguments));
+        faults.extend(arguments.write_fe.as_deref().and_then(unfit_name));
         if !faults.is_empty() {
             return Err(Faults(faults));
         }
@@ -348,6 +353,38 @@ pub(super) fn unused(arguments: &SpaceArguments) -> Vec<String> {
         .collect()
 }
 
+/// Options that would do nothing beside the others.
+fn idle(arguments: &FoamArguments) -> Vec<String> {
+    let (is_early, two) = (arguments.stop_after.is_some(), arguments.layers == 2);
+    let early = "needs a relaxed foam: leave out --stop-after";
+    let options = [
+        (is_early && arguments.write_fe.is_some(), "--write-fe", early),
+        (is_early && arguments.extrapolate, "--extrapolate", early),
+        (is_early && arguments.anneal > 0, "--anneal", early),
+        (
+            two && arguments.write_fe.is_some(),
+            "--write-fe",
+            "is for one layer of cells: leave out --layers 2",
+        ),
+        (!two && arguments.pattern.is_some(), "--pattern", "is for two layers of cells: add --layers 2"),
+    ];
+    options
+        .into_iter()
+        .filter(|(is_idle, ..)| *is_idle)
+        .map(|(_, option, why)| format!("{option} {why}"))
+        .collect()
+}
+
+/// What is wrong with the name of a datafile; its ending keeps it off the other files of the folder.
+fn unfit_name(name: &str) -> Option<String> {
+    let path = Path::new(name);
+    let is_bare = path.file_name().is_some_and(|bare| bare == name);
+    let is_datafile = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("fe"));
+    (!(is_bare && is_datafile)).then(|| {
+        format!("--write-fe {name:?} must be a plain file name that ends in .fe, as in foam.fe: it is written into the folder of --output")
+    })
+}
+
 /// Sizes that no machine at hand can do.
 fn too_much(arguments: &FoamArguments, cells: usize) -> Vec<String> {
     let mut faults = Vec::new();
@@ -366,6 +403,12 @@ fn too_much(arguments: &FoamArguments, cells: usize) -> Vec<String> {
     }
     if arguments.runs > 1 && arguments.stop_after.is_some() {
         faults.push("--runs keeps the foam of least energy, which is known only after relaxation: leave out --stop-after".to_owned());
+    }
+    if arguments.lloyd > MOST_LLOYD {
+        faults.push(format!(
+            "--lloyd {} must be at most {MOST_LLOYD}: seeds have settled long before",
+            arguments.lloyd
+        ));
     }
     if let Some(jobs) = arguments.jobs
         && !(1..=MOST_JOBS).contains(&jobs)

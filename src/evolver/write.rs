@@ -54,6 +54,12 @@ const ONTO_STEPS: usize = 30;
 /// The digits that bring a number back as it was.
 const DIGITS: usize = 17;
 
+/// What to do about volumes where walls are curved.
+const VOLUMES: [&str; 2] = [
+    "// Volumes are those between these flat faces, on curved walls a little too small and unequal. To equal ones, again after",
+    "// each refinement (r, V):  each := avg(bodies, volume); set bodies target each; g 50",
+];
+
 /// A height that stands for a missing period, in units of the foam's own extent: nothing wraps along it.
 const TALL: f64 = 10.0;
 
@@ -108,6 +114,9 @@ fn head(space: &FoamSpace, complex: &Complex, places: &Places, title: &str) -> R
         let _ = writeln!(out, "{line}");
     };
     push("// Films are faces of tension 1; faces of tension 0 close the cells on the walls.".to_owned());
+    for line in VOLUMES {
+        push(line.to_owned());
+    }
     if complex.period.0.iter().any(Option::is_some) {
         let extent = places.iter().fold(0.0, |most: f64, p| most.max(p.abs().max_element()));
         push("TORUS\nPERIODS".to_owned());

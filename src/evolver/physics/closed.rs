@@ -6,7 +6,7 @@ use crate::{
     evolver::{
         datafile::{Model, Representation, Side},
         language::formula::Bound,
-        surface::{BodyId, FacetId, Surface, VertexId, body_images},
+        surface::{BodyId, Directed, FacetId, Surface, VertexId, body_images},
     },
     foam::{
         complex::{
@@ -19,7 +19,7 @@ use crate::{
     surface::{LevelSet, Period, Wall},
 };
 use glam::{DMat3, DVec3, IVec3};
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 /// A formula as a level set.
 #[derive(Debug)]
@@ -96,25 +96,38 @@ pub(crate) fn closed_volumes(
         .collect()
 }
 
-/// Bodies whose free edges all lie on constraints.
+/// Bodies whose free edges all lie on constraints, each of them a film's: a line in which a body ends on two constraints at once
+/// bounds no film, and its patches there are not closed by the films' edges.
 fn closable_bodies(surface: &Surface) -> Vec<bool> {
     let neighbours = surface.neighbours();
     let mut closable = vec![true; surface.bodies.len()];
     for (id, edge) in surface.edges.enumerated() {
-        for body in surface.bodies.ids() {
-            let mut uses = 0_usize;
-            for &(facet, _) in &neighbours.facets[id] {
-                uses += surface.facets[facet].bodies.iter().filter(|&&b| b == Some(body)).count();
+        let mut uses: BTreeMap<BodyId, [usize; 2]> = BTreeMap::new();
+        for &(facet, _) in &neighbours.facets[id] {
+            let on_wall = usize::from(lies_on_wall(surface, facet));
+            for body in surface.facets[facet].bodies.into_iter().flatten() {
+                uses.entry(body).or_default()[on_wall] += 1;
             }
-            if uses == 1 && edge.common.constraints.is_empty() {
+        }
+        let constraints = edge.common.constraints.len();
+        for (body, [films, patches]) in uses {
+            let is_open = films + patches == 1 && constraints == 0;
+            let has_no_film = films == 0 && constraints > 1;
+            if is_open || has_no_film {
                 closable[body.index()] = false;
-            }
-            if surface.bodies.len() > 64 {
-                break;
             }
         }
     }
     closable
+}
+
+/// Whether a facet lies on a wall: it is then part of the wall's patch, which is integrated on the wall itself.
+fn lies_on_wall(surface: &Surface, id: FacetId) -> bool {
+    let facet = &surface.facets[id];
+    let shared = |d: &Directed| {
+        facet.common.constraints.iter().any(|c| surface.edges[d.edge].common.constraints.contains(c))
+    };
+    !facet.common.constraints.is_empty() && facet.edges.iter().all(shared)
 }
 
 /// The films as a complex: region 0 is the open air, then the bodies.
@@ -173,11 +186,7 @@ fn film(surface: &Surface, id: FacetId, images: &[IVec3; 2], shape: Shape) -> Op
     if facet.bodies == [None, None] || facet.noncontent {
         return None;
     }
-    // A facet that lies on a wall is part of the wall's patch, which is integrated on the wall itself.
-    let on_wall = facet.edges.iter().all(|d| {
-        facet.common.constraints.iter().any(|c| surface.edges[d.edge].common.constraints.contains(c))
-    });
-    if on_wall && !facet.common.constraints.is_empty() {
+    if lies_on_wall(surface, id) {
         return None;
     }
     let side = |at: usize| match facet.bodies[at] {

@@ -36,7 +36,7 @@ impl Meshes {
     /// to about 1e-6 where it bends round a neck: the paper's bubble in a neck of P comes out 8e-7 off.
     #[must_use]
     pub fn fine() -> Self {
-        Self((2..=5).map(|through| Annulus { around: 8 * through, through }).collect())
+        Self((2..2 + MESHES).map(|through| Annulus { around: 8 * through, through }).collect())
     }
 
     /// The limit of a figure that was found on all meshes, and how far it moves without the coarsest.
@@ -76,6 +76,8 @@ pub struct Bubble {
     pub places: Places,
 }
 
+/// How many meshes the finest figures come from.
+const MESHES: usize = 4;
 /// How many eigenvalues are reported.
 const EIGENVALUES: usize = 4;
 
@@ -115,14 +117,14 @@ pub fn held(gap: &Gap, volume: f64, place: DVec3, meshes: &Meshes) -> Result<Bub
 }
 
 /// The lowest eigenvalues of the second variation of a bubble's energy with volume and centre held: energy per squared
-/// displacement of the film, integrated over it. On a coarse mesh: the lowest modes are smooth, and it has them to three
-/// digits.
+/// displacement of the film, integrated over it, on the finest mesh.
 ///
 /// # Errors
 /// As [`held`].
 pub fn shape_modes(gap: &Gap, volume: f64, place: DVec3) -> Result<Vec<f64>, NoBubble> {
     let chart = chart_at(gap, volume, place)?;
-    let (ends, sheet) = levels(&chart, volume, &Meshes::coarse())?;
+    let finest = Meshes::fine().0.split_off(MESHES - 1);
+    let (ends, sheet) = levels(&chart, volume, &Meshes(finest))?;
     Ok(sheet.spectrum(&ends[0], EIGENVALUES))
 }
 

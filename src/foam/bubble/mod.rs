@@ -49,6 +49,14 @@ pub use thin::ThinGap;
 
 use glam::DVec3;
 
+fn last_step(residual: f64) -> String {
+    if residual.is_finite() {
+        format!(" (the last step was {residual:.1e} of its radius)")
+    } else {
+        String::new()
+    }
+}
+
 /// Why there is no such bubble.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoBubble {
@@ -98,7 +106,8 @@ pub enum NoBubble {
     },
     /// Newton's steps did not end.
     #[error(
-        "the bubble at {place} does not come to equilibrium (the last step was {residual:.1e} of its radius): it is probably too large for the gap there"
+        "the bubble at {place} does not come to equilibrium{}: it is probably too large for the gap there",
+        last_step(*.residual)
     )]
     Unsolved {
         /// Its centre.

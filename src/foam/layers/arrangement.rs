@@ -195,6 +195,9 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
     let domain = Domain::of_surface(middle);
     let middle_samples = SurfaceSamples::new(middle, 0.0, AREA_LINES);
     let spacing = spacing(middle_samples.area(), cells);
+    let [below, above] = gap.halves().map(|half| gap_volume(&half, &domain) / as_f64(cells));
+    refuse_flat(gap, &middle_samples, [below, above], cells)?;
+    refuse_deep_everywhere(gap, &middle_samples, [below, above], cells)?;
     if cells > MOST_CELLS {
         return Err(NoLayers::Many {
             cells,
@@ -202,9 +205,6 @@ fn annealed(gap: &Gap, cells: usize, seed: u64, progress: &mut Progress<'_>) -> 
             width: spacing * (as_f64(cells) / as_f64(MOST_CELLS)).sqrt(),
         });
     }
-    let [below, above] = gap.halves().map(|half| gap_volume(&half, &domain) / as_f64(cells));
-    refuse_flat(gap, &middle_samples, [below, above], cells)?;
-    refuse_deep_everywhere(gap, &middle_samples, [below, above], cells)?;
     let settings = SeedSettings::new(cells, seed);
     let mut places = Vec::with_capacity(2 * cells);
     for layer in 0..2 {

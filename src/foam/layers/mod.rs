@@ -42,12 +42,20 @@ pub use figures::{LayerFigures, layer_figures};
 use crate::foam::{seeds::SeedError, setup::FoamSpace};
 use glam::DVec3;
 
+fn best_rows(rows: usize, columns: usize, stretch: f64) -> String {
+    match rows {
+        0 => "their number is odd, and every other row is shifted".to_owned(),
+        _ => format!("the best, {rows} rows of {columns}, would be stretched by {stretch:.1} %"),
+    }
+}
+
 /// Why there is no two-layer foam.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoLayers {
     /// The number of cells does not make rows on the periods.
     #[error(
-        "{cells} cells a layer make no rows of regular hexagons on the periods {periods:?}: the best, {rows} rows of {columns}, would be stretched by {stretch:.1} %; change the periods or the number of cells"
+        "{cells} cells a layer make no rows of regular hexagons on the periods {periods:?}: {}; change the periods or the number of cells",
+        best_rows(*.rows, *.columns, *.stretch)
     )]
     Rows {
         /// Cells asked for.
@@ -95,7 +103,7 @@ pub enum NoLayers {
     },
     /// The layers are too flat.
     #[error(
-        "the layers are too flat: where the gap is narrowest a cell would be {flattest:.2} of its width high, and films between the layers would reach the walls; ask for {needed:.0} cells on each wall or more, or widen the gap"
+        "the layers are too flat: where the gap is narrowest a cell would be {flattest:.2} of its width high, and films between the layers would reach the walls; ask for {needed:.0} cells on each wall or more (2000 at most), or widen the gap"
     )]
     Flat {
         /// The least height of a cell over its width.
@@ -105,7 +113,7 @@ pub enum NoLayers {
     },
     /// Cells of few sides are too deep.
     #[error(
-        "the layers are too deep: cells of five sides or fewer would be up to {deepest:.1} times as deep as they are wide at their wall, and from about 1.7 times on their pressure squeezes such cells off it; ask for about {fitting:.0} cells on each wall, or for a narrower gap"
+        "the layers are too deep: cells of five sides or fewer would be up to {deepest:.1} times as deep as they are wide at their wall, and from about 1.7 times on their pressure squeezes such cells off it; ask for about {fitting:.0} cells on each wall, where the gap is nowhere too flat for so few, or for a narrower or more even gap"
     )]
     Deep {
         /// The greatest depth of a cell over its width.
