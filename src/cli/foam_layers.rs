@@ -178,18 +178,8 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
     };
     folder.write_json("summary.json", &summary)?;
     let mut lines = table(&summary, &layers);
-    lines.extend((is_balanced && !layers.is_even).then(uneven));
-    match extrapolated {
-        None => {}
-        Some(None) => lines.push(no_extrapolation()),
-        Some(Some(found)) => lines.extend(extrapolation(&found)),
-    }
-    for (name, figures) in [("lower layer", &figures[0]), ("upper layer", &figures[1])] {
-        lines.push((name, in_words(figures)));
-    }
-    if defects.defects.iter().all(|&count| count > 0) {
-        lines.extend(in_figures(&defects));
-    }
+    lines.extend(accuracy(&layers, extrapolated));
+    lines.extend(in_layers(&figures, &defects));
     lines.push(("time", format!("{:.1} s", summary.seconds)));
     let ended = summary.ended.clone();
     finished(folder, lines)?;
@@ -198,6 +188,27 @@ pub(super) fn run(settings: &FoamSettings, pattern: PatternName, fine: bool) -> 
         return Ok(());
     }
     Err(CliError::failure(anyhow!("the two layers are in no balance: {ended}")))
+}
+
+/// What the mesh has to do with the energy.
+fn accuracy(layers: &FreeFoam, extrapolated: Option<Option<Extrapolated>>) -> Vec<Line> {
+    let is_uneven = layers.descended.ending == Ending::Converged && !layers.is_even;
+    let mut lines: Vec<Line> = is_uneven.then(uneven).into_iter().collect();
+    match extrapolated {
+        None => {}
+        Some(None) => lines.push(no_extrapolation()),
+        Some(Some(found)) => lines.extend(extrapolation(&found)),
+    }
+    lines
+}
+
+/// The cells of both layers, and how their defects sit to each other.
+fn in_layers(figures: &[LayerFigures; 2], defects: &Companions) -> Vec<Line> {
+    let mut lines = vec![("lower layer", in_words(&figures[0])), ("upper layer", in_words(&figures[1]))];
+    if defects.defects.iter().all(|&count| count > 0) {
+        lines.extend(in_figures(defects));
+    }
+    lines
 }
 
 fn as_f64(count: usize) -> f64 {
