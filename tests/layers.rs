@@ -188,7 +188,8 @@ fn layers_that_do_not_fit_are_refused() {
         panic!("flat layers are refused");
     };
     assert!((0.1..0.5).contains(&flattest) && needed > 64.0, "{flattest} {needed}");
-    assert!(matches!(sown(space(), Arrangement::Annealed, 6000), Err(NoLayers::Many { .. })));
+    let large = FoamSpace::Plane { periods: [80.0, 80.0], height: HEIGHT };
+    assert!(matches!(sown(large, Arrangement::Annealed, 6000), Err(NoLayers::Many { .. })));
     // A sphere's pattern has cells of five sides: too deep ones are refused before anything is settled.
     let deep = FoamSpace::Sphere { radii: [1.0, 2.0] };
     let Err(NoLayers::Deep { deepest, fitting }) = sown(deep, Arrangement::Annealed, 400) else {
